@@ -1,0 +1,104 @@
+//! A BRDF on every cell of the grid.
+
+use crate::direction::{Direction, wrap_deg};
+use crate::grid::Grid;
+
+/// A BRDF tabulated on a [`Grid`]: three planes, one a colour channel, each `n_cells` long in the
+/// order of [`Grid::cell`] (row = light, column = view).
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenseBrdf {
+    grid: Grid,
+    planes: [Vec<f32>; 3],
+}
+
+impl DenseBrdf {
+    /// Wraps three planes of values. `None` when a plane is not `grid.n_cells()` long.
+    pub fn new(grid: Grid, planes: [Vec<f32>; 3]) -> Option<Self> {
+        planes
+            .iter()
+            .all(|p| p.len() == grid.n_cells())
+            .then_some(Self { grid, planes })
+    }
+
+    /// The grid of the table.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The red, green and blue planes.
+    pub fn planes(&self) -> &[Vec<f32>; 3] {
+        &self.planes
+    }
+
+    /// Takes the planes out, to move them into a file.
+    pub fn into_planes(self) -> [Vec<f32>; 3] {
+        self.planes
+    }
+
+    /// The value at a pair of direction indices.
+    pub fn at(&self, light: usize, view: usize) -> [f32; 3] {
+        let cell = self.grid.cell(light, view);
+        [0, 1, 2].map(|c| self.planes[c][cell])
+    }
+
+    /// The value at any pair of directions, linear between the nodes in all four angles; beyond
+    /// the last elevation the last node's value.
+    pub fn lookup(&self, light: Direction, view: Direction) -> [f32; 3] {
+        let light = self.corners(light);
+        let view = self.corners(view);
+        let mut sum = [0.0f64; 3];
+        for (i, wi) in light {
+            for (v, wv) in view {
+                let weight = wi * wv;
+                if weight > 0.0 {
+                    let value = self.at(i, v);
+                    for c in 0..3 {
+                        sum[c] += weight * f64::from(value[c]);
+                    }
+                }
+            }
+        }
+        sum.map(|s| s as f32)
+    }
+
+    /// The four nodes around a direction with their bilinear weights.
+    fn corners(&self, d: Direction) -> [(usize, f64); 4] {
+        let step = self.grid.step_deg();
+        let n_phi = self.grid.n_phi();
+        let t = (d.theta_deg() / step).clamp(0.0, (self.grid.n_theta() - 1) as f64);
+        let p = wrap_deg(d.phi_deg()) / step;
+        let (t0, p0) = (t.floor() as usize, p.floor() as usize);
+        let t1 = (t0 + 1).min(self.grid.n_theta() - 1);
+        let (p0, p1) = (p0 % n_phi, (p0 + 1) % n_phi);
+        let (ft, fp) = (t - t.floor(), p - p.floor());
+        [
+            (t0 * n_phi + p0, (1.0 - ft) * (1.0 - fp)),
+            (t0 * n_phi + p1, (1.0 - ft) * fp),
+            (t1 * n_phi + p0, ft * (1.0 - fp)),
+            (t1 * n_phi + p1, ft * fp),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lookup_is_exact_at_nodes_and_linear_between() {
+        let grid = Grid::with_step_deg(30.0).unwrap();
+        let value = |i: usize, v: usize| (3 * i + 7 * v) as f32;
+        let n = grid.n_directions();
+        let plane: Vec<f32> = (0..grid.n_cells()).map(|c| value(c / n, c % n)).collect();
+        let dense = DenseBrdf::new(grid, [plane.clone(), plane.clone(), plane]).unwrap();
+        for (i, v) in [(13, 25), (12, 35)] {
+            let at = dense.lookup(grid.direction(i), grid.direction(v));
+            assert!((at[0] - value(i, v)).abs() < 1e-3);
+        }
+        let between = dense.lookup(Direction::from_deg(30.0, 15.0), grid.direction(24));
+        assert!((between[1] - 0.5 * (value(12, 24) + value(13, 24))).abs() < 1e-3);
+        let wrapped = dense.lookup(Direction::from_deg(30.0, 345.0), grid.direction(24));
+        assert!((wrapped[2] - 0.5 * (value(23, 24) + value(12, 24))).abs() < 1e-3);
+        assert!(DenseBrdf::new(grid, [vec![], vec![], vec![]]).is_none());
+    }
+}

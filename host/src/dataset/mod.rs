@@ -1,0 +1,7 @@
+//! Files: rigs, capture folders, samples, dense BRDFs.
+
+pub mod frame;
+pub mod rig;
+
+pub use frame::Frame;
+pub use rig::Rig;

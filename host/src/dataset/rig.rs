@@ -1,0 +1,116 @@
+//! `rig.toml`: where light, camera and target are.
+
+use serde::{Deserialize, Serialize};
+
+/// The geometry of a rig and how its frames are sampled.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rig {
+    /// The light.
+    pub light: Light,
+    /// The camera.
+    pub camera: Camera,
+    /// The target's marks and the sample's size.
+    pub target: Target,
+    /// The reference's reflectance, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Reference>,
+    /// The grid of sampling points.
+    pub sampling: Sampling,
+}
+
+/// A point source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Distance from the sample's centre, metres.
+    pub distance_m: f64,
+}
+
+/// A pinhole camera with optional radial distortion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Distance from the sample's centre, metres.
+    pub distance_m: f64,
+    /// Width of a frame, pixels.
+    pub width_px: usize,
+    /// Height of a frame, pixels.
+    pub height_px: usize,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Principal point (x, y), pixels; the centre of the top left pixel is (0.5, 0.5).
+    pub centre_px: [f64; 2],
+    /// Radial distortion, coefficient of r² (r in units of the focal length).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k1: f64,
+    /// Radial distortion, coefficient of r⁴.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k2: f64,
+}
+
+/// Four bright lines on a dark desk, and the square sample inside them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Lines at x = ±a and y = ±a: a, to the centre of the line, mm.
+    pub line_offset_mm: f64,
+    /// Width of a line, mm.
+    pub line_width_mm: f64,
+    /// Half the side of the sample, mm.
+    pub material_half_mm: f64,
+}
+
+/// A Lambertian reference of known albedo.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Albedo per channel, 0 < ρ ≤ 1.
+    pub reflectance: [f64; 3],
+}
+
+/// The sampling points of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sampling {
+    /// Points lie within this distance of the centre, mm.
+    pub disc_radius_mm: f64,
+    /// Distance between points, mm.
+    pub grid_mm: f64,
+    /// Side of the square whose median is a point's value, mm.
+    pub patch_mm: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+impl Rig {
+    /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
+    /// elevation up to 75°.
+    pub fn paper(px: usize) -> Self {
+        Self {
+            light: Light { distance_m: 1.1 },
+            camera: Camera {
+                distance_m: 1.8,
+                width_px: px,
+                height_px: px,
+                focal_px: 1600.0 / 1024.0 * px as f64,
+                centre_px: [px as f64 / 2.0; 2],
+                k1: 0.0,
+                k2: 0.0,
+            },
+            target: Target {
+                line_offset_mm: 335.0,
+                line_width_mm: 4.0,
+                material_half_mm: 320.0,
+            },
+            reference: None,
+            sampling: Sampling {
+                disc_radius_mm: 277.0,
+                grid_mm: 14.0,
+                patch_mm: 14.0,
+            },
+        }
+    }
+}

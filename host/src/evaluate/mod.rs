@@ -1,0 +1,1 @@
+//! How far one BRDF is from another.

@@ -1,0 +1,9 @@
+//! gonia on the host: from poses to a dense BRDF.
+//!
+//! Data flows one way: `plan → poses → [link → arms] → frames → registration → samples →
+//! compensation → bins → interpolation → dense BRDF → EXR, pictures, report`.
+pub mod dataset;
+pub mod evaluate;
+pub mod link;
+pub mod report;
+pub mod vision;

@@ -1,0 +1,2 @@
+//! All that travels on the wire. No I/O.
+#![no_std]
