@@ -20,6 +20,12 @@ impl DenseBrdf {
             .then_some(Self { grid, planes })
     }
 
+    /// Wraps planes that are known to be of the grid's size.
+    pub(crate) fn from_planes(grid: Grid, planes: [Vec<f32>; 3]) -> Self {
+        debug_assert!(planes.iter().all(|p| p.len() == grid.n_cells()));
+        Self { grid, planes }
+    }
+
     /// The grid of the table.
     pub fn grid(&self) -> Grid {
         self.grid

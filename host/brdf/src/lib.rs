@@ -3,12 +3,16 @@
 //! Conventions: θ is measured from the sample's normal, φ anticlockwise from the sample's x axis
 //! seen from above, both in radians unless a name ends in `_deg`; a unit vector is
 //! `(sin θ cos φ, sin θ sin φ, cos θ)`.
+pub mod bins;
 pub mod dense;
 pub mod direction;
 pub mod grid;
+pub mod hemisphere;
+pub mod interpolate;
 pub mod model;
 pub mod sample;
 
+pub use bins::{Bin, Bins};
 pub use dense::DenseBrdf;
 pub use direction::{Direction, Pose, Vec3};
 pub use grid::Grid;

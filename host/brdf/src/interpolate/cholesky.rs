@@ -1,0 +1,200 @@
+//! Cholesky factorisation of one small matrix in single precision, for any SIMD width.
+
+use pulp::Simd;
+
+/// Columns are factored this many at a time.
+pub const PANEL: usize = 4;
+
+/// A symmetric matrix of `n` columns with extra rows below, column by column. Column `j` holds
+/// rows `0..rows`; only rows `≥ j` count. The extra rows (`n..rows`) are right-hand sides, and
+/// leave the factorisation as `L⁻¹ b`: forward substitution costs nothing of its own.
+#[derive(Default)]
+pub struct Columns {
+    data: Vec<f32>,
+    rows: usize,
+}
+
+impl Columns {
+    /// Makes room for `n` columns of `rows` rows each; what is inside is unspecified. Both are to be
+    /// multiples of the SIMD width and of [`PANEL`].
+    pub fn resize(&mut self, n: usize, rows: usize) {
+        self.rows = rows;
+        self.data.resize(n * rows, 0.0);
+    }
+
+    /// Column `j`.
+    pub fn column(&self, j: usize) -> &[f32] {
+        &self.data[j * self.rows..(j + 1) * self.rows]
+    }
+
+    /// Column `j`, to be written.
+    pub fn column_mut(&mut self, j: usize) -> &mut [f32] {
+        &mut self.data[j * self.rows..(j + 1) * self.rows]
+    }
+
+    /// Replaces the matrix in the first `n` rows by its factor L, and each extra row by `L⁻¹ b`.
+    /// `false` when a pivot is not positive: the matrix is not positive definite in single
+    /// precision, and its contents are spoilt.
+    #[inline(always)]
+    pub fn factor<S: Simd>(&mut self, simd: S, n: usize) -> bool {
+        let rows = self.rows;
+        for j in (0..n).step_by(PANEL) {
+            let (done, panel) = self.data.split_at_mut(j * rows);
+            let panel = &mut panel[..PANEL * rows];
+            let first = j / S::F32_LANES * S::F32_LANES;
+            update(simd, done, panel, rows, j, first);
+            if !factor_panel(simd, panel, rows, j, first) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// `panel −= L[.., ..j] · L[j..j+4, ..j]ᵀ` in rows `first..`.
+#[inline(always)]
+fn update<S: Simd>(simd: S, done: &[f32], panel: &mut [f32], rows: usize, j: usize, first: usize) {
+    let lanes = S::F32_LANES;
+    let mut row = first;
+    while row + 3 * lanes <= rows {
+        update_strip::<S, 3>(simd, done, panel, rows, j, row);
+        row += 3 * lanes;
+    }
+    while row < rows {
+        update_strip::<S, 1>(simd, done, panel, rows, j, row);
+        row += lanes;
+    }
+}
+
+/// The same in `R` vectors of rows from `row`: 4 R accumulators stay in registers.
+#[inline(always)]
+fn update_strip<S: Simd, const R: usize>(
+    simd: S,
+    done: &[f32],
+    panel: &mut [f32],
+    rows: usize,
+    j: usize,
+    row: usize,
+) {
+    let lanes = S::F32_LANES;
+    let mut acc = [[simd.splat_f32s(0.0); R]; PANEL];
+    for column in done.chunks_exact(rows) {
+        let (strip, _) = S::as_simd_f32s(&column[row..row + R * lanes]);
+        let pivots = &column[j..j + PANEL];
+        for c in 0..PANEL {
+            let pivot = simd.splat_f32s(pivots[c]);
+            for r in 0..R {
+                acc[c][r] = simd.mul_add_e_f32s(strip[r], pivot, acc[c][r]);
+            }
+        }
+    }
+    for c in 0..PANEL {
+        let at = c * rows + row;
+        let (target, _) = S::as_mut_simd_f32s(&mut panel[at..at + R * lanes]);
+        for r in 0..R {
+            target[r] = simd.sub_f32s(target[r], acc[c][r]);
+        }
+    }
+}
+
+/// Factors the panel's own four columns.
+#[inline(always)]
+fn factor_panel<S: Simd>(simd: S, panel: &mut [f32], rows: usize, j: usize, first: usize) -> bool {
+    for c in 0..PANEL {
+        let (left, right) = panel.split_at_mut(c * rows);
+        let column = &mut right[..rows];
+        for done in left.chunks_exact(rows) {
+            let pivot = simd.splat_f32s(-done[j + c]);
+            let (source, _) = S::as_simd_f32s(&done[first..]);
+            let (target, _) = S::as_mut_simd_f32s(&mut column[first..]);
+            for (t, s) in target.iter_mut().zip(source) {
+                *t = simd.mul_add_e_f32s(*s, pivot, *t);
+            }
+        }
+        let diagonal = column[j + c];
+        // Written so that NaN fails too.
+        if !(diagonal > 0.0) {
+            return false;
+        }
+        let scale = simd.splat_f32s(1.0 / diagonal.sqrt());
+        let (target, _) = S::as_mut_simd_f32s(&mut column[first..]);
+        for t in target {
+            *t = simd.mul_f32s(*t, scale);
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Arch, WithSimd};
+
+    struct Factor<'a>(&'a mut Columns, usize);
+    impl WithSimd for Factor<'_> {
+        type Output = bool;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> bool {
+            self.0.factor(simd, self.1)
+        }
+    }
+
+    fn matrix(n: usize, diagonal: f32) -> Columns {
+        let mut m = Columns::default();
+        m.resize(n, n + 16);
+        for j in 0..n {
+            for i in 0..n {
+                let d = (i as f32 - j as f32).abs() / n as f32;
+                m.column_mut(j)[i] = (-d).exp() + if i == j { diagonal } else { 0.0 };
+            }
+            for extra in 0..16 {
+                m.column_mut(j)[n + extra] = ((j + extra) % 7) as f32;
+            }
+        }
+        m
+    }
+
+    #[test]
+    fn the_factor_multiplies_back_to_the_matrix_and_solves_the_extra_rows() {
+        for n in [16, 48, 192] {
+            let original = matrix(n, 0.1);
+            let mut l = matrix(n, 0.1);
+            assert!(Arch::new().dispatch(Factor(&mut l, n)));
+            for i in 0..n {
+                for j in 0..=i {
+                    let product: f64 = (0..=j)
+                        .map(|k| f64::from(l.column(k)[i]) * f64::from(l.column(k)[j]))
+                        .sum();
+                    assert!((product - f64::from(original.column(j)[i])).abs() < 1e-5);
+                }
+                // Row i of L times the solved right-hand side is the right-hand side.
+                let b: f64 = (0..=i)
+                    .map(|k| f64::from(l.column(k)[i]) * f64::from(l.column(k)[n + 3]))
+                    .sum();
+                assert!((b - f64::from(original.column(i)[n + 3])).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_factor() {
+        let n = 48;
+        let (mut a, mut b) = (matrix(n, 0.1), matrix(n, 0.1));
+        assert!(Arch::new().dispatch(Factor(&mut a, n)));
+        assert!(Factor(&mut b, n).with_simd(pulp::Scalar));
+        for j in 0..n {
+            for i in j..n + 16 {
+                let (x, y) = (a.column(j)[i], b.column(j)[i]);
+                assert!((x - y).abs() < 1e-4 * y.abs().max(1.0), "{i} {j}: {x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_definite_is_refused() {
+        let mut m = matrix(16, -0.9);
+        assert!(!Arch::new().dispatch(Factor(&mut m, 16)));
+        let mut m = matrix(16, f32::NAN);
+        assert!(!Arch::new().dispatch(Factor(&mut m, 16)));
+    }
+}

@@ -1,0 +1,96 @@
+//! Where a (light, view) pair lies in the space in which distances are taken.
+//!
+//! Exchanging light and view only flips the sign of the second half in both systems, so a
+//! reciprocal BRDF is even in it, and mirrored samples lie where they belong.
+
+use crate::direction::Vec3;
+
+/// A point of the six-dimensional embedding.
+pub type Point = [f32; 6];
+
+/// A system of coordinates for pairs of directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coordinates {
+    /// `(√2·h, w (i − v)/√2)` with the unit half vector h: highlights depend on h alone, so it
+    /// suits sharp lobes.
+    HalfDifference {
+        /// Weight w of the difference.
+        weight: f64,
+    },
+    /// `((i + v)/√2, w (i − v)/√2)`: for w = 1 the plain chord distance, rotated.
+    SumDifference {
+        /// Weight w of the difference.
+        weight: f64,
+    },
+}
+
+impl Coordinates {
+    /// The point of a pair of unit vectors.
+    pub fn point(&self, light: Vec3, view: Vec3) -> Point {
+        let sum = [light[0] + view[0], light[1] + view[1], light[2] + view[2]];
+        let (scale, weight) = match *self {
+            Self::HalfDifference { weight } => {
+                let length = crate::direction::dot(sum, sum).sqrt().max(1e-9);
+                (std::f64::consts::SQRT_2 / length, weight)
+            }
+            Self::SumDifference { weight } => (std::f64::consts::FRAC_1_SQRT_2, weight),
+        };
+        let w = weight * std::f64::consts::FRAC_1_SQRT_2;
+        [
+            (sum[0] * scale) as f32,
+            (sum[1] * scale) as f32,
+            (sum[2] * scale) as f32,
+            ((light[0] - view[0]) * w) as f32,
+            ((light[1] - view[1]) * w) as f32,
+            ((light[2] - view[2]) * w) as f32,
+        ]
+    }
+}
+
+impl std::fmt::Display for Coordinates {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::HalfDifference { weight } => write!(f, "half/difference w={weight}"),
+            Self::SumDifference { weight } => write!(f, "sum/difference w={weight}"),
+        }
+    }
+}
+
+/// Squared distance of two points.
+pub fn distance2(a: &Point, b: &Point) -> f32 {
+    (0..6).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direction::Direction;
+
+    #[test]
+    fn exchange_of_light_and_view_flips_the_difference_only() {
+        let a = Direction::from_deg(30.0, 50.0).to_vec3();
+        let b = Direction::from_deg(70.0, 200.0).to_vec3();
+        for coordinates in [
+            Coordinates::HalfDifference { weight: 0.5 },
+            Coordinates::SumDifference { weight: 0.5 },
+        ] {
+            let (p, q) = (coordinates.point(a, b), coordinates.point(b, a));
+            for k in 0..3 {
+                assert_eq!(p[k], q[k]);
+                assert_eq!(p[k + 3], -q[k + 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn sum_and_difference_of_weight_one_keep_chord_distances() {
+        let d = |t, p| Direction::from_deg(t, p).to_vec3();
+        let (i, v, j, w) = (d(10.0, 20.0), d(40.0, 80.0), d(15.0, 25.0), d(45.0, 70.0));
+        let c = Coordinates::SumDifference { weight: 1.0 };
+        let chord2: f64 = (0..3)
+            .map(|k| (i[k] - j[k]).powi(2) + (v[k] - w[k]).powi(2))
+            .sum();
+        let got = distance2(&c.point(i, v), &c.point(j, w));
+        assert!((f64::from(got) - chord2).abs() < 1e-6);
+    }
+}

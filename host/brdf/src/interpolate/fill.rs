@@ -1,0 +1,225 @@
+//! All cells, block by block.
+
+use super::Settings;
+use super::block::BlockSolver;
+use super::neighbours::Neighbours;
+use super::nodes::nodes_of;
+use super::patches::{Patch, cover};
+use crate::bins::Bins;
+use crate::dense::DenseBrdf;
+use crate::grid::Grid;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
+
+/// Fewer filled bins than this say nothing about a four-dimensional function.
+pub const MIN_BINS: usize = 8;
+
+/// Why a set of bins cannot be interpolated.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum FillError {
+    /// Too little to go by.
+    #[error("only {0} bins are filled, and at least {MIN_BINS} are needed: measure more poses")]
+    TooFewBins(usize),
+}
+
+/// Interpolates every cell of the bins' grid. Positive, finite, exactly reciprocal, one value a
+/// pole. `progress` is told the share done, 0 ..= 1, from any thread.
+pub fn fill(
+    bins: &Bins,
+    settings: &Settings,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<DenseBrdf, FillError> {
+    if bins.bins().len() < MIN_BINS {
+        return Err(FillError::TooFewBins(bins.bins().len()));
+    }
+    let grid = bins.grid();
+    let neighbours = Neighbours::new(nodes_of(bins.bins().iter(), settings.coordinates));
+    let patches = cover(grid, settings.patch_deg);
+    let planes = SharedPlanes::new(grid);
+    let pairs = patches.len() * (patches.len() + 1) / 2;
+    let done = AtomicUsize::new(0);
+    (0..patches.len())
+        .into_par_iter()
+        // Early patches have the most partners; hand them out one by one.
+        .with_max_len(1)
+        .for_each_init(Workspace::default, |workspace, p| {
+            for q in p..patches.len() {
+                workspace.solve(&neighbours, settings, &patches[p], &patches[q]);
+                planes.store(grid, workspace, p == q, &patches[p], &patches[q]);
+            }
+            let before = done.fetch_add(patches.len() - p, Relaxed);
+            progress((before + patches.len() - p) as f64 / pairs as f64);
+        });
+    Ok(planes.into_dense(grid))
+}
+
+/// What a thread keeps from block to block.
+#[derive(Default)]
+struct Workspace {
+    solver: BlockSolver,
+    found: Vec<(f32, u32)>,
+    /// Values of the cells of the block, light by light.
+    values: Vec<[f32; 3]>,
+}
+
+impl Workspace {
+    fn solve(&mut self, neighbours: &Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
+        let coordinates = settings.coordinates;
+        let centre = coordinates.point(p.centre, q.centre);
+        let radius = neighbours.gather(&centre, settings.nodes, &mut self.found);
+        let nodes = neighbours.nodes();
+        let block = settings.block();
+        self.solver.fit(
+            self.found.iter().map(|(_, k)| &nodes[*k as usize]),
+            radius,
+            &block,
+        );
+        self.values.clear();
+        for light in &p.vectors {
+            for view in &q.vectors {
+                let point = coordinates.point(*light, *view);
+                let log = self.solver.evaluate(&point, radius, &block);
+                // e^±60 are far beyond any BRDF and far within single precision.
+                self.values.push(log.map(|v| v.clamp(-60.0, 60.0).exp()));
+            }
+        }
+    }
+}
+
+/// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
+/// spare an argument about which thread owns which row.
+struct SharedPlanes([Vec<AtomicU32>; 3]);
+
+impl SharedPlanes {
+    fn new(grid: Grid) -> Self {
+        Self([(); 3].map(|()| (0..grid.n_cells()).map(|_| AtomicU32::new(0)).collect()))
+    }
+
+    /// Stores a block and its mirror image.
+    fn store(&self, grid: Grid, workspace: &Workspace, same: bool, p: &Patch, q: &Patch) {
+        for (a, light) in p.directions.iter().enumerate() {
+            for (b, view) in q.directions.iter().enumerate() {
+                // Within one patch both orders of a pair are there; the first serves for both.
+                if same && b < a {
+                    continue;
+                }
+                let value = workspace.values[a * q.directions.len() + b];
+                let (light, view) = (*light as usize, *view as usize);
+                let (cell, mirror) = (grid.cell(light, view), grid.cell(view, light));
+                for c in 0..3 {
+                    let bits = value[c].to_bits();
+                    self.0[c][cell].store(bits, Relaxed);
+                    self.0[c][mirror].store(bits, Relaxed);
+                }
+            }
+        }
+    }
+
+    fn into_dense(self, grid: Grid) -> DenseBrdf {
+        let planes = self.0.map(|plane| {
+            // Same size and alignment: the vector is reused in place.
+            let mut plane: Vec<f32> = plane
+                .into_iter()
+                .map(|bits| f32::from_bits(bits.into_inner()))
+                .collect();
+            spread_poles(grid, &mut plane);
+            plane
+        });
+        DenseBrdf::from_planes(grid, planes)
+    }
+}
+
+/// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
+fn spread_poles(grid: Grid, plane: &mut [f32]) {
+    let (n, n_phi) = (grid.n_directions(), grid.n_phi());
+    for row in plane.chunks_exact_mut(n) {
+        let pole = row[0];
+        row[1..n_phi].fill(pole);
+    }
+    for row in 1..n_phi {
+        plane.copy_within(0..n, row * n);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direction::Direction;
+    use crate::model::{Brdf, Kurt};
+    use crate::sample::Sample;
+
+    fn samples(model: &dyn Brdf, n: usize) -> Vec<Sample> {
+        // A Halton sequence over the four angles, uniform in solid angle.
+        let halton = |mut k: usize, base: usize| {
+            let (mut f, mut x) = (1.0, 0.0);
+            while k > 0 {
+                f /= base as f64;
+                x += f * (k % base) as f64;
+                k /= base;
+            }
+            x
+        };
+        let cos_max = 87f64.to_radians().cos();
+        (1..=n)
+            .map(|k| {
+                let theta = |u: f64| (1.0 - u * (1.0 - cos_max)).acos().to_degrees();
+                let light = Direction::from_deg(theta(halton(k, 2)), 360.0 * halton(k, 3));
+                let view = Direction::from_deg(theta(halton(k, 5)), 360.0 * halton(k, 7));
+                Sample {
+                    theta_i_deg: light.theta_deg() as f32,
+                    phi_i_deg: light.phi_deg() as f32,
+                    theta_v_deg: view.theta_deg() as f32,
+                    phi_v_deg: view.phi_deg() as f32,
+                    rgb: model
+                        .eval(light.to_vec3(), view.to_vec3())
+                        .map(|v| v as f32),
+                    frame: 0,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_smooth_material_is_filled_reciprocally_and_close_to_the_truth() {
+        let model = Kurt::white_reference_fabric();
+        let grid = Grid::with_step_deg(10.0).unwrap();
+        let fine = Grid::with_step_deg(2.0).unwrap();
+        let bins = Bins::new(fine, &samples(&model, 60_000));
+        let coarse = Bins::new(grid, &samples(&model, 60_000));
+        assert!(coarse.bins().len() < bins.bins().len());
+        let settings = Settings {
+            patch_deg: 10.0,
+            ..Settings::DEFAULT
+        };
+        let dense = fill(&coarse, &settings, &|_| ()).unwrap();
+        let n = grid.n_directions();
+        let mut sum = 0.0;
+        for light in 0..n {
+            for view in 0..n {
+                let value = dense.at(light, view);
+                assert_eq!(value, dense.at(view, light), "reciprocity");
+                assert!(value.iter().all(|v| *v > 0.0 && v.is_finite()));
+                if light < grid.n_phi() {
+                    assert_eq!(value, dense.at(0, view), "one value at the pole");
+                }
+                let truth = model.eval(
+                    grid.direction(light).to_vec3(),
+                    grid.direction(view).to_vec3(),
+                );
+                sum += (f64::from(value[1]) / truth[1]).ln().powi(2);
+            }
+        }
+        let rms = (sum / (n * n) as f64).sqrt();
+        assert!(rms < 0.03, "log-RMS {rms}");
+    }
+
+    #[test]
+    fn too_few_bins_are_refused() {
+        let model = Kurt::white_reference_fabric();
+        let bins = Bins::new(Grid::PAPER, &samples(&model, 7));
+        assert_eq!(
+            fill(&bins, &Settings::DEFAULT, &|_| ()),
+            Err(FillError::TooFewBins(7))
+        );
+    }
+}
