@@ -1,2 +1,30 @@
-//! The project's own chores.
-fn main() {}
+//! The project's own chores. `cargo xtask test` does all that a change must pass.
+
+mod steps;
+mod tools;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+cargo xtask test    set up what the tests need, then fmt, clippy, boards, all tests
+cargo xtask boards  build the firmware of every board";
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let outcome = match command.as_str() {
+        "test" => steps::test(),
+        "boards" => steps::boards(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -141,15 +141,16 @@ impl WithSimd for Fit<'_> {
         s.matrix.resize(padded, rows);
         let mut sum = 0.0f32;
         for j in 0..n {
-            let place = [0, 1, 2, 3, 4, 5].map(|k| simd.splat_f32s(s.axes[k][j]));
+            let mut place = [simd.splat_f32s(0.0); 6];
+            for k in 0..6 {
+                place[k] = simd.splat_f32s(s.axes[k][j]);
+            }
             let first = j / S::F32_LANES * S::F32_LANES;
             let column = s.matrix.column_mut(j);
             let (target, _) = S::as_mut_simd_f32s(&mut column[first..padded]);
-            let axes: [&[S::f32s]; 6] =
-                [0, 1, 2, 3, 4, 5].map(|k| S::as_simd_f32s(&s.axes[k][first..padded]).0);
+            let axes = vectors::<S>(&s.axes, first..padded);
             for (r, t) in target.iter_mut().enumerate() {
-                let there = axes.map(|a| a[r]);
-                *t = kernel(simd, &place, &there, self.scale);
+                *t = kernel(simd, &place, &axes, r, self.scale);
             }
             sum += column[j + 1..n].iter().sum::<f32>();
             column[n..].fill(0.0);
@@ -260,13 +261,20 @@ impl WithSimd for Evaluate<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f32; 3] {
         let s = self.solver;
-        let place = self.point.map(|x| simd.splat_f32s(x));
-        let axes: [&[S::f32s]; 6] = [0, 1, 2, 3, 4, 5].map(|k| S::as_simd_f32s(&s.axes[k]).0);
-        let weights: [&[S::f32s]; 3] = [0, 1, 2].map(|c| S::as_simd_f32s(&s.weights[c]).0);
+        let mut place = [simd.splat_f32s(0.0); 6];
+        for k in 0..6 {
+            place[k] = simd.splat_f32s(self.point[k]);
+        }
+        let padded = s.axes[0].len();
+        let axes = vectors::<S>(&s.axes, 0..padded);
+        let weights = [
+            S::as_simd_f32s(&s.weights[0]).0,
+            S::as_simd_f32s(&s.weights[1]).0,
+            S::as_simd_f32s(&s.weights[2]).0,
+        ];
         let mut sums = [simd.splat_f32s(0.0); 3];
         for r in 0..axes[0].len() {
-            let there = axes.map(|a| a[r]);
-            let k = kernel(simd, &place, &there, self.scale);
+            let k = kernel(simd, &place, &axes, r, self.scale);
             for c in 0..3 {
                 sums[c] = simd.mul_add_e_f32s(k, weights[c][r], sums[c]);
             }
@@ -279,12 +287,33 @@ impl WithSimd for Evaluate<'_> {
     }
 }
 
-/// Matérn 3/2 of the distance times `scale` (√3 over the range).
+/// A range of the six axes as vectors. Spelt out, like all that is below `with_simd`: a closure
+/// there would be compiled without the instruction set.
 #[inline(always)]
-fn kernel<S: Simd>(simd: S, a: &[S::f32s; 6], b: &[S::f32s; 6], scale: f32) -> S::f32s {
+fn vectors<S: Simd>(axes: &[Vec<f32>; 6], range: std::ops::Range<usize>) -> [&[S::f32s]; 6] {
+    [
+        S::as_simd_f32s(&axes[0][range.clone()]).0,
+        S::as_simd_f32s(&axes[1][range.clone()]).0,
+        S::as_simd_f32s(&axes[2][range.clone()]).0,
+        S::as_simd_f32s(&axes[3][range.clone()]).0,
+        S::as_simd_f32s(&axes[4][range.clone()]).0,
+        S::as_simd_f32s(&axes[5][range]).0,
+    ]
+}
+
+/// Matérn 3/2 of the distances from `place` to vector `r` of the axes, times `scale` (√3 over the
+/// range).
+#[inline(always)]
+fn kernel<S: Simd>(
+    simd: S,
+    place: &[S::f32s; 6],
+    axes: &[&[S::f32s]; 6],
+    r: usize,
+    scale: f32,
+) -> S::f32s {
     let mut d2 = simd.splat_f32s(0.0);
     for k in 0..6 {
-        let d = simd.sub_f32s(a[k], b[k]);
+        let d = simd.sub_f32s(place[k], axes[k][r]);
         d2 = simd.mul_add_e_f32s(d, d, d2);
     }
     let s = simd.mul_f32s(simd.sqrt_f32s(d2), simd.splat_f32s(scale));
@@ -319,7 +348,7 @@ fn exp_minus<S: Simd>(simd: S, s: S::f32s) -> S::f32s {
     p
 }
 
-const _: () = assert!(PAD % PANEL == 0);
+const _: () = assert!(PAD.is_multiple_of(PANEL));
 
 #[cfg(test)]
 mod tests {

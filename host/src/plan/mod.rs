@@ -1,0 +1,233 @@
+//! Which poses to measure, and in which order.
+//!
+//! All pairs of some light and some view directions are visited. Both arms move at the same time,
+//! so a step costs the slowest axis; the order makes most steps a short move of one arm.
+
+pub mod tour;
+
+use gonia_brdf::hemisphere::{OBLIQUE_LIGHTS, Ring, UNIFORM_RINGS, directions};
+use gonia_brdf::{Direction, Pose};
+use std::str::FromStr;
+
+/// The directions that a plan combines, each list in rings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rings {
+    /// Rings of light directions.
+    pub lights: Vec<Ring>,
+    /// Rings of view directions.
+    pub views: Vec<Ring>,
+}
+
+impl Rings {
+    /// The paper's 105 lights × 81 views = 8505 poses.
+    pub fn paper() -> Self {
+        let mut lights = UNIFORM_RINGS.to_vec();
+        lights.push(OBLIQUE_LIGHTS);
+        Self {
+            lights,
+            views: UNIFORM_RINGS.to_vec(),
+        }
+    }
+
+    /// A plan of minutes rather than hours: 37 lights × 25 views = 925 poses.
+    pub fn quick() -> Self {
+        let views = vec![(0.0, 1), (25.0, 5), (50.0, 8), (73.0, 11)];
+        let mut lights = views.clone();
+        lights.push((85.0, 12));
+        Self { lights, views }
+    }
+
+    /// All poses, light by light, as the paper lists them.
+    pub fn listed(&self) -> Vec<Pose> {
+        let views = directions(&self.views);
+        directions(&self.lights)
+            .into_iter()
+            .flat_map(|light| views.iter().map(move |view| Pose { light, view: *view }))
+            .collect()
+    }
+}
+
+/// A list of rings as people write it: `0:1,15:6,30:12` (elevation in degrees, number of
+/// azimuths).
+#[derive(Clone, Debug, PartialEq)]
+pub struct RingList(pub Vec<Ring>);
+
+impl FromStr for RingList {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split(',')
+            .map(|item| {
+                let bad = || format!("'{item}' is not ELEVATION:COUNT, as in 15:6");
+                let (theta, n) = item.split_once(':').ok_or_else(bad)?;
+                let theta: f64 = theta.trim().parse().map_err(|_| bad())?;
+                let n: usize = n.trim().parse().map_err(|_| bad())?;
+                if !(0.0..90.0).contains(&theta) || !(1..=3600).contains(&n) {
+                    return Err(format!(
+                        "'{item}': the elevation must lie in 0..90 degrees and the count in 1..=3600"
+                    ));
+                }
+                Ok((theta, n))
+            })
+            .collect::<Result<Vec<_>, _>>()
+            .map(RingList)
+    }
+}
+
+/// How long the arms take from one direction to another, in seconds: (from, to).
+pub type MoveTime<'a> = &'a dyn Fn(Direction, Direction) -> f64;
+
+/// Poses in travelling order, and what the order is worth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The poses.
+    pub poses: Vec<Pose>,
+    /// Time spent moving, seconds, from the first pose to the last.
+    pub travel_s: f64,
+    /// The same in the listed order.
+    pub listed_travel_s: f64,
+    /// No order can be faster: every pose but one has to be entered from another one, and the
+    /// quickest way in is from the nearest direction of either arm.
+    pub bound_s: f64,
+}
+
+/// Orders all poses of some rings. `light_time` and `view_time` are the arms' own.
+pub fn plan(rings: &Rings, light_time: MoveTime, view_time: MoveTime) -> Plan {
+    let lights = directions(&rings.lights);
+    let views = directions(&rings.views);
+    let light_path = tour::shortest_path(&lights, light_time);
+    let view_path = tour::shortest_path(&views, view_time);
+    let snake = |lights_inside: bool| -> Vec<Pose> {
+        let (outer, inner) = if lights_inside {
+            (&view_path, &light_path)
+        } else {
+            (&light_path, &view_path)
+        };
+        outer
+            .iter()
+            .enumerate()
+            .flat_map(|(turn, o)| {
+                let mut row: Vec<usize> = inner.clone();
+                if turn % 2 == 1 {
+                    row.reverse();
+                }
+                row.into_iter().map(move |i| (*o, i))
+            })
+            .map(|(o, i)| if lights_inside { (i, o) } else { (o, i) })
+            .map(|(l, v)| Pose {
+                light: lights[l],
+                view: views[v],
+            })
+            .collect()
+    };
+    let time = |poses: &[Pose]| travel_time(poses, light_time, view_time);
+    let (a, b) = (snake(true), snake(false));
+    let (time_a, time_b) = (time(&a), time(&b));
+    let (poses, travel_s) = if time_a <= time_b {
+        (a, time_a)
+    } else {
+        (b, time_b)
+    };
+    Plan {
+        poses,
+        travel_s,
+        listed_travel_s: time(&rings.listed()),
+        bound_s: bound(&lights, &views, light_time, view_time),
+    }
+}
+
+/// Time to travel through poses in the given order, both arms moving at once; seconds.
+pub fn travel_time(poses: &[Pose], light_time: MoveTime, view_time: MoveTime) -> f64 {
+    poses
+        .windows(2)
+        .map(|w| light_time(w[0].light, w[1].light).max(view_time(w[0].view, w[1].view)))
+        .sum()
+}
+
+fn bound(
+    lights: &[Direction],
+    views: &[Direction],
+    light_time: MoveTime,
+    view_time: MoveTime,
+) -> f64 {
+    let nearest = |of: &[Direction], time: MoveTime| -> Vec<f64> {
+        (0..of.len())
+            .map(|k| {
+                (0..of.len())
+                    .filter(|j| *j != k)
+                    .map(|j| time(of[j], of[k]))
+                    .fold(f64::INFINITY, f64::min)
+            })
+            .collect()
+    };
+    let (light, view) = (nearest(lights, light_time), nearest(views, view_time));
+    let entries = light.iter().flat_map(|l| view.iter().map(|v| l.min(*v)));
+    // A plan of a single pose has no way in at all.
+    let entries: Vec<f64> = entries.filter(|e| e.is_finite()).collect();
+    let dearest = entries.iter().copied().fold(0.0, f64::max);
+    entries.iter().sum::<f64>() - dearest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A degree a second, whichever axis is slower.
+    fn time(a: Direction, b: Direction) -> f64 {
+        (a.theta_deg() - b.theta_deg())
+            .abs()
+            .max((a.phi_deg() - b.phi_deg()).abs())
+    }
+
+    #[test]
+    fn a_plan_visits_every_pose_once() {
+        let rings = Rings::quick();
+        let plan = plan(&rings, &time, &time);
+        assert_eq!(plan.poses.len(), 925);
+        let key = |p: &Pose| {
+            [p.light, p.view].map(|d| {
+                (
+                    (d.theta_deg() * 1e6).round() as i64,
+                    (d.phi_deg() * 1e6).round() as i64,
+                )
+            })
+        };
+        let mut keys: Vec<_> = plan.poses.iter().map(key).collect();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), 925);
+    }
+
+    #[test]
+    fn the_papers_plan_travels_near_its_lower_bound() {
+        let plan = plan(&Rings::paper(), &time, &time);
+        assert_eq!(plan.poses.len(), 8505);
+        assert!(plan.bound_s <= plan.travel_s);
+        assert!(plan.travel_s < plan.listed_travel_s);
+        assert!(
+            plan.travel_s < 1.2 * plan.bound_s,
+            "{} {}",
+            plan.travel_s,
+            plan.bound_s
+        );
+    }
+
+    #[test]
+    fn a_single_pose_needs_no_travel() {
+        let one = Rings {
+            lights: vec![(0.0, 1)],
+            views: vec![(0.0, 1)],
+        };
+        let plan = plan(&one, &time, &time);
+        assert_eq!((plan.travel_s, plan.bound_s), (0.0, 0.0));
+    }
+
+    #[test]
+    fn rings_are_read_as_people_write_them() {
+        let list: RingList = "0:1, 15:6".parse().unwrap();
+        assert_eq!(list.0, [(0.0, 1), (15.0, 6)]);
+        for bad in ["", "15", "15:0", "90:4", "-1:4", "15:x"] {
+            assert!(bad.parse::<RingList>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! What the chores do, step by step.
+
+use crate::tools::{TARGET, add_target, install, run};
+use anyhow::{Context, Result};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+/// The board that runs in QEMU, and its program.
+const QEMU_BOARD: &str = "qemu-mps2";
+
+/// All that a change must pass.
+pub fn test() -> Result<()> {
+    let root = root()?;
+    let mut table = Table::default();
+    table.step("target for the boards", add_target)?;
+    let qemu = install("qemu-system-arm", "qemu-system-arm");
+    table.step("format", || {
+        run(cargo(&root).args(["fmt", "--all", "--check"]))?;
+        for board in board_folders(&root)? {
+            run(cargo(&board).args(["fmt", "--check"]))?;
+        }
+        Ok(())
+    })?;
+    table.step("clippy", || {
+        run(cargo(&root).args([
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "-D",
+            "warnings",
+        ]))
+    })?;
+    table.step("boards", || build_boards(&root))?;
+    table.step("tests", || {
+        let mut tests = cargo(&root);
+        tests.args(["test", "--workspace"]);
+        if qemu {
+            tests.env("GONIA_QEMU_ELF", qemu_elf(&root));
+        }
+        run(&mut tests)
+    })?;
+    if !qemu {
+        table.not_run(
+            "firmware in QEMU",
+            "qemu-system-arm is missing: apt-get install qemu-system-arm",
+        );
+    }
+    table.print();
+    Ok(())
+}
+
+/// Builds the firmware of every board.
+pub fn boards() -> Result<()> {
+    add_target()?;
+    build_boards(&root()?)
+}
+
+fn build_boards(root: &Path) -> Result<()> {
+    for board in board_folders(root)? {
+        println!("board {}", board.display());
+        run(cargo(&board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
+        run(cargo(&board).args(["build", "--release"]))?;
+    }
+    Ok(())
+}
+
+fn board_folders(root: &Path) -> Result<Vec<PathBuf>> {
+    let folder = root.join("firmware/boards");
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(&folder).with_context(|| format!("{}", folder.display()))? {
+        let path = entry?.path();
+        if path.join("Cargo.toml").is_file() {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn qemu_elf(root: &Path) -> PathBuf {
+    root.join("firmware/boards")
+        .join(QEMU_BOARD)
+        .join("target")
+        .join(TARGET)
+        .join("release")
+        .join(QEMU_BOARD)
+}
+
+/// Cargo in a folder, without what an outer cargo passed down: the boards choose their own target.
+fn cargo(folder: &Path) -> Command {
+    let mut command = Command::new("cargo");
+    command.current_dir(folder);
+    for name in ["CARGO_TARGET_DIR", "CARGO_BUILD_TARGET", "RUSTFLAGS"] {
+        if folder.ends_with("boards") || folder.parent().is_some_and(|p| p.ends_with("boards")) {
+            command.env_remove(name);
+        }
+    }
+    command
+}
+
+fn root() -> Result<PathBuf> {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .map(Path::to_path_buf)
+        .context("xtask has no parent folder")
+}
+
+/// What ran, and for how long.
+#[derive(Default)]
+struct Table(Vec<String>);
+
+impl Table {
+    fn step(&mut self, name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
+        println!("== {name}");
+        let start = Instant::now();
+        work().with_context(|| name.to_string())?;
+        self.0.push(format!(
+            "passed  {name} ({:.0} s)",
+            start.elapsed().as_secs_f64()
+        ));
+        Ok(())
+    }
+
+    /// Red on a terminal that knows colours, and said twice: a test that did not run has not passed.
+    fn not_run(&mut self, name: &str, why: &str) {
+        let line = format!("\x1b[1;31mNOT RUN {name}: {why}\x1b[0m");
+        eprintln!("{line}");
+        self.0.push(line);
+    }
+
+    fn print(&self) {
+        println!();
+        for line in &self.0 {
+            println!("{line}");
+        }
+    }
+}
