@@ -20,6 +20,7 @@ pub mod rig_toml;
 pub mod samples;
 mod samples_csv;
 mod samples_npy;
+pub mod summary;
 mod toml_text;
 pub mod whole_file;
 
@@ -30,4 +31,5 @@ pub use error::FileError;
 pub use frame::Frame;
 pub use frames_csv::{FrameRow, Role};
 pub use rig::Rig;
+pub use summary::Summary;
 pub use whole_file::{check_writable, write_whole};
