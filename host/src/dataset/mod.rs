@@ -1,7 +1,35 @@
-//! Files: rigs, capture folders, samples, dense BRDFs.
+//! Files: rigs, capture folders, samples, plans, dense BRDFs, summaries.
+//!
+//! Every reader refuses what it cannot trust with a [`FileError`]: one line that says which file,
+//! where in it, and what to do. Every writer goes through [`write_whole`], so that no half-written
+//! file ever stands under its final name.
 
+pub mod capture_folder;
+pub mod cell_mask;
+mod csv_table;
+pub mod dense_exr;
+pub mod error;
+mod exr_planes;
 pub mod frame;
+pub mod frame_exr;
+pub mod frames_csv;
+mod npy;
+pub mod plan_csv;
 pub mod rig;
+pub mod rig_toml;
+pub mod samples;
+mod samples_csv;
+mod samples_npy;
+pub mod summary;
+mod toml_text;
+pub mod whole_file;
 
+pub use capture_folder::CaptureFolder;
+pub use cell_mask::CellMask;
+pub use dense_exr::{DenseFile, Scale};
+pub use error::FileError;
 pub use frame::Frame;
+pub use frames_csv::{FrameRow, Role};
 pub use rig::Rig;
+pub use summary::Summary;
+pub use whole_file::{check_writable, write_whole};

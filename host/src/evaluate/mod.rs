@@ -1,1 +1,17 @@
 //! How far one BRDF is from another.
+//!
+//! [`compare`] gives the figures of merit by stratum; [`mod@render`] draws the sphere and the
+//! cylinder that the image differences (and the report's pictures) are made of.
+
+mod accumulate;
+pub mod color;
+pub mod compare;
+pub mod figures;
+pub mod render;
+pub mod stratum;
+pub mod tabulated;
+
+pub use compare::{CompareError, Options, Side, compare};
+pub use figures::{Figures, StratumFigures};
+pub use stratum::Stratum;
+pub use tabulated::Tabulated;

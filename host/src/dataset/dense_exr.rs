@@ -1,0 +1,219 @@
+//! A dense BRDF as a square RGB float EXR: row = light direction, column = view direction, each
+//! counted `n_phi·iθ + iφ` (7920 × 7920 for the paper's grid).
+
+use super::FileError;
+use super::exr_planes::{self, ExrPlanes, Plane};
+use gonia_brdf::{DenseBrdf, Grid};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+/// What gonia's own attributes begin with in the file.
+const PREFIX: &str = "gonia.";
+/// The attribute that holds the [`Scale`].
+const SCALE: &str = "gonia.scale";
+
+/// Whether values are 1/sr.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// In 1/sr: the reference's reflectance was known.
+    Absolute,
+    /// Up to one factor: nothing of known reflectance was measured.
+    Relative,
+}
+
+impl fmt::Display for Scale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Scale::Absolute => "absolute",
+            Scale::Relative => "relative",
+        })
+    }
+}
+
+/// A dense BRDF with what its file says about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenseFile {
+    /// The values.
+    pub brdf: DenseBrdf,
+    /// Whether they are 1/sr. A file made by others that does not say counts as relative.
+    pub scale: Scale,
+    /// Where the data came from, by name; in the file every name begins with `gonia.`.
+    pub provenance: BTreeMap<String, String>,
+}
+
+/// Writes a dense BRDF whole. The planes move into the writer and come back, so that the peak of
+/// memory is one image.
+///
+/// # Errors
+/// When the file cannot be written, or a name in the provenance is empty or not Latin.
+pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError> {
+    let DenseFile {
+        brdf,
+        scale,
+        provenance,
+    } = file;
+    let grid = brdf.grid();
+    let side = grid.n_directions();
+    let mut attributes: BTreeMap<String, String> = provenance
+        .iter()
+        .map(|(name, text)| (format!("{PREFIX}{name}"), text.clone()))
+        .collect();
+    attributes.insert(SCALE.into(), scale.to_string());
+    let planes = brdf.into_planes().map(Plane::F32);
+    let image = ExrPlanes {
+        width: side,
+        height: side,
+        planes,
+        attributes,
+    };
+    let planes = exr_planes::write(path, image)?.map(Plane::into_f32);
+    let brdf = rebuilt(path, grid, planes)?;
+    Ok(DenseFile {
+        brdf,
+        scale,
+        provenance,
+    })
+}
+
+fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, FileError> {
+    DenseBrdf::new(grid, planes)
+        .ok_or_else(|| FileError::new(path, "its planes differ in size", "copy or make it again"))
+}
+
+/// Reads a dense BRDF, gonia's or anybody's square RGB EXR of a grid's size.
+///
+/// # Errors
+/// One line naming the file, and the cell where there is one: not an EXR, cut short, not RGB, not
+/// square or of no grid's size, or with values that are NaN or infinite.
+pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
+    let no_grid = |width, height| {
+        let size = format!("is {width} × {height} pixels, which no grid has");
+        (
+            size,
+            "give a dense BRDF: 7920 × 7920 for steps of 2°".to_owned(),
+        )
+    };
+    let image = exr_planes::read(path, |width, height| {
+        let grid = Grid::from_directions(width).filter(|_| width == height);
+        grid.map(|_| ()).ok_or_else(|| no_grid(width, height))
+    })?;
+    let grid = Grid::from_directions(image.width).ok_or_else(|| {
+        let (problem, remedy) = no_grid(image.width, image.height);
+        FileError::new(path, problem, remedy)
+    })?;
+    let scale = match image.attributes.get(SCALE).map(String::as_str) {
+        Some("absolute") => Scale::Absolute,
+        Some("relative") | None => Scale::Relative,
+        Some(other) => {
+            return Err(FileError::new(
+                path,
+                format_args!("\"{other}\" is no scale"),
+                "write absolute or relative",
+            )
+            .at(format_args!("attribute {SCALE}")));
+        }
+    };
+    let provenance = image
+        .attributes
+        .iter()
+        .filter(|(name, _)| *name != SCALE)
+        .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
+        .collect();
+    let brdf = rebuilt(path, grid, image.planes.map(Plane::into_f32))?;
+    check_finite(path, &brdf)?;
+    Ok(DenseFile {
+        brdf,
+        scale,
+        provenance,
+    })
+}
+
+fn check_finite(path: &Path, brdf: &DenseBrdf) -> Result<(), FileError> {
+    let grid = brdf.grid();
+    for (plane, name) in brdf.planes().iter().zip(["R", "G", "B"]) {
+        let bad = plane.par_iter().position_first(|value| !value.is_finite());
+        if let Some(cell) = bad {
+            let (light, view) = grid.light_and_view(cell);
+            let (i, v) = (grid.direction(light), grid.direction(view));
+            return Err(FileError::new(
+                path,
+                format_args!("{} is no BRDF value", plane[cell]),
+                "fill the missing cells first (gonia fill)",
+            )
+            .at(format_args!(
+                "channel {name}, row {light}, column {view} (light {:.0}°/{:.0}°, view {:.0}°/{:.0}°)",
+                i.theta_deg(),
+                i.phi_deg(),
+                v.theta_deg(),
+                v.phi_deg()
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::write_rgb_file;
+
+    fn dense() -> DenseBrdf {
+        let grid = Grid::with_step_deg(30.0).unwrap();
+        let plane = |c: f32| (0..grid.n_cells()).map(|k| c + k as f32).collect();
+        DenseBrdf::new(grid, [plane(0.0), plane(0.25), plane(0.5)]).unwrap()
+    }
+
+    #[test]
+    fn a_dense_brdf_keeps_its_values_scale_and_provenance() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("dense.exr");
+        let provenance = BTreeMap::from([("rig".into(), "simulated, seed 7".to_string())]);
+        for scale in [Scale::Absolute, Scale::Relative] {
+            let file = DenseFile {
+                brdf: dense(),
+                scale,
+                provenance: provenance.clone(),
+            };
+            assert_eq!(write_dense(&path, file.clone()).unwrap(), file);
+            assert_eq!(read_dense(&path).unwrap(), file);
+        }
+    }
+
+    #[test]
+    fn a_square_made_by_others_is_read_and_counts_as_relative() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("others.exr");
+        let side = Grid::with_step_deg(30.0).unwrap().n_directions();
+        write_rgb_file(&path, side, side, |x, y| (x as f32, y as f32, 1.0f32)).unwrap();
+        let file = read_dense(&path).unwrap();
+        assert_eq!((file.scale, file.provenance.len()), (Scale::Relative, 0));
+        assert_eq!(file.brdf.at(3, 5), [5.0, 3.0, 1.0]);
+    }
+
+    #[test]
+    fn sizes_of_no_grid_and_nan_are_refused_with_their_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("odd.exr");
+        for (w, h) in [(36, 24), (35, 35)] {
+            write_rgb_file(&path, w, h, |_, _| (1.0f32, 1.0f32, 1.0f32)).unwrap();
+            let error = read_dense(&path).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!("is {w} × {h} pixels, which no grid has")),
+                "{error}"
+            );
+        }
+        let side = Grid::with_step_deg(30.0).unwrap().n_directions();
+        let value = |x, y| if (x, y) == (14, 25) { f32::NAN } else { 1.0 };
+        write_rgb_file(&path, side, side, |x, y| (1.0f32, 1.0f32, value(x, y))).unwrap();
+        let error = read_dense(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("channel B, row 25, column 14 (light 60°/30°, view 30°/60°)"),
+            "{error}"
+        );
+        assert_eq!(error.lines().count(), 1);
+    }
+}

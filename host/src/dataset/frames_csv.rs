@@ -1,0 +1,264 @@
+//! `frames.csv`: which frame was taken of what, and where the arms were.
+
+use super::FileError;
+use super::csv_table::CsvTable;
+use super::whole_file::write_whole;
+use gonia_brdf::Pose;
+use std::collections::HashSet;
+use std::io::Write;
+use std::path::{Component, Path};
+
+/// What lay on the target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// The material that is being measured.
+    Material,
+    /// The reference that frames are compensated by.
+    Reference,
+}
+
+impl Role {
+    /// Its word in `frames.csv`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Material => "material",
+            Role::Reference => "reference",
+        }
+    }
+}
+
+/// One frame of a capture folder.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameRow {
+    /// Number of the frame; unique among those of its role.
+    pub frame: u32,
+    /// What lay on the target.
+    pub role: Role,
+    /// The arms' reading.
+    pub pose: Pose,
+    /// Path of the EXR, relative to the capture folder.
+    pub file: String,
+}
+
+/// Reads `frames.csv`. Columns are found by name, in any order; others are ignored.
+///
+/// # Errors
+/// One line naming the file and its line: a missing column, a number that is none, an elevation
+/// outside 0° ≤ θ < 90°, an unknown role, a frame named twice, or a path that leaves the folder.
+pub fn read_frames_csv(path: &Path) -> Result<Vec<FrameRow>, FileError> {
+    let mut table = CsvTable::open(path)?;
+    let [frame, role, theta_i, phi_i, theta_v, phi_v, file] = [
+        table.column("frame")?,
+        table.column("role")?,
+        table.column("theta_i_deg")?,
+        table.column("phi_i_deg")?,
+        table.column("theta_v_deg")?,
+        table.column("phi_v_deg")?,
+        table.column("file")?,
+    ];
+    let mut rows = Vec::new();
+    let mut seen = HashSet::new();
+    while table.next_row()? {
+        let row = FrameRow {
+            frame: table.number(frame)?,
+            role: parse_role(&table, role)?,
+            pose: Pose {
+                light: table.arm_direction(theta_i, phi_i)?,
+                view: table.arm_direction(theta_v, phi_v)?,
+            },
+            file: parse_file(&table, file)?,
+        };
+        if !seen.insert((row.frame, row.role)) {
+            return Err(table.wrong(
+                format_args!("{} frame {} is there twice", row.role.name(), row.frame),
+                "number the frames of a role differently",
+            ));
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
+    match table.text(column)? {
+        "material" => Ok(Role::Material),
+        "reference" => Ok(Role::Reference),
+        other => Err(table.wrong(
+            format_args!("role \"{other}\" is unknown"),
+            "write material or reference",
+        )),
+    }
+}
+
+fn parse_file(table: &CsvTable, column: usize) -> Result<String, FileError> {
+    let file = table.text(column)?;
+    if file.is_empty() {
+        return Err(table.wrong("the file is not named", "give its path inside the folder"));
+    }
+    let inside = Path::new(file)
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if !inside {
+        return Err(table.wrong(
+            format_args!("\"{file}\" is not inside the capture folder"),
+            "give a path relative to it, without \"..\"",
+        ));
+    }
+    Ok(file.to_owned())
+}
+
+/// Writes `frames.csv` whole. Angles keep their nearest millionth of a degree.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_frames_csv(path: &Path, rows: &[FrameRow]) -> Result<(), FileError> {
+    write_whole(path, |out| {
+        writeln!(
+            out,
+            "frame,role,theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg,file"
+        )?;
+        for row in rows {
+            let Pose { light, view } = row.pose;
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{}",
+                row.frame,
+                row.role.name(),
+                Degrees(light.theta_deg()),
+                Degrees(light.phi_deg()),
+                Degrees(view.theta_deg()),
+                Degrees(view.phi_deg()),
+                Quoted(&row.file),
+            )?;
+        }
+        Ok(())
+    })
+}
+
+/// Degrees as people write them: no more than six decimals, and none that say nothing.
+pub(super) struct Degrees(pub f64);
+
+impl std::fmt::Display for Degrees {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", (self.0 * 1e6).round() / 1e6)
+    }
+}
+
+/// A text field, quoted where CSV needs it.
+struct Quoted<'a>(&'a str);
+
+impl std::fmt::Display for Quoted<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.0.contains([',', '"', '\n', '\r', '#']) {
+            write!(f, "\"{}\"", self.0.replace('"', "\"\""))
+        } else {
+            f.write_str(self.0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_brdf::Direction;
+
+    const HEADER: &str = "frame,role,theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg,file\n";
+
+    fn read_text(text: &str) -> Result<Vec<FrameRow>, FileError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        std::fs::write(&path, text).unwrap();
+        read_frames_csv(&path)
+    }
+
+    #[test]
+    fn rows_come_back_as_they_were_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        let row = |frame, role, theta, phi: f64, file: &str| FrameRow {
+            frame,
+            role,
+            pose: Pose {
+                light: Direction::from_deg(theta, phi),
+                view: Direction::from_deg(30.0, 90.0),
+            },
+            file: file.into(),
+        };
+        let rows = vec![
+            row(0, Role::Material, 15.0, 60.0, "frames/000000.exr"),
+            row(0, Role::Reference, 85.123457, 359.9, "frames/a, b.exr"),
+        ];
+        write_frames_csv(&path, &rows).unwrap();
+        let back = read_frames_csv(&path).unwrap();
+        for (a, b) in rows.iter().zip(&back) {
+            assert_eq!((a.frame, a.role, &a.file), (b.frame, b.role, &b.file));
+            assert!((a.pose.light.theta - b.pose.light.theta).abs() < 1e-8);
+            assert!((a.pose.light.phi - b.pose.light.phi).abs() < 1e-8);
+        }
+        assert_eq!(rows.len(), back.len());
+        assert!(
+            std::fs::read_to_string(&path)
+                .unwrap()
+                .contains("\n0,material,15,60,30,90,")
+        );
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_azimuths_wrap() {
+        let rows = read_text(
+            "note,file,phi_v_deg,theta_v_deg,phi_i_deg,theta_i_deg,role,frame\n\
+             x, f/1.exr, -90, 0, 420, 89.9, reference, 7\n",
+        )
+        .unwrap();
+        assert_eq!((rows[0].frame, rows[0].role), (7, Role::Reference));
+        assert_eq!(rows[0].file, "f/1.exr");
+        assert!((rows[0].pose.light.phi_deg() - 60.0).abs() < 1e-9);
+        assert!((rows[0].pose.view.phi_deg() - 270.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_cannot_be_trusted_is_refused_with_its_line() {
+        for (row, said) in [
+            (
+                "1,material,90,0,0,0,a.exr",
+                "theta_i_deg 90 is not an elevation",
+            ),
+            (
+                "1,material,0,0,-1,0,a.exr",
+                "theta_v_deg -1 is not an elevation",
+            ),
+            (
+                "1,material,nan,0,0,0,a.exr",
+                "theta_i_deg NaN is not an elevation",
+            ),
+            ("1,material,0,inf,0,0,a.exr", "phi_i_deg is inf"),
+            ("-1,material,0,0,0,0,a.exr", "frame \"-1\""),
+            ("1,dust,0,0,0,0,a.exr", "role \"dust\""),
+            (
+                "1,material,0,0,0,0,/etc/a.exr",
+                "not inside the capture folder",
+            ),
+            (
+                "1,material,0,0,0,0,b/../../a.exr",
+                "not inside the capture folder",
+            ),
+            ("1,material,0,0,0,0,", "the file is not named"),
+            (
+                "1,material,0,0,0,a.exr",
+                "6 fields where the first line names 7",
+            ),
+            (
+                "0,material,0,0,0,0,b.exr",
+                "material frame 0 is there twice",
+            ),
+        ] {
+            let text = format!("{HEADER}0,material,1,2,3,4,a.exr\n{row}\n");
+            let error = read_text(&text).unwrap_err().to_string();
+            assert!(error.contains("frames.csv, line 3: "), "{error}");
+            assert!(error.contains(said), "{error}");
+            assert_eq!(error.lines().count(), 1);
+        }
+        let error = read_text("frame,role\n").unwrap_err().to_string();
+        assert!(error.contains("no column \"theta_i_deg\""), "{error}");
+    }
+}

@@ -1,0 +1,286 @@
+//! `rig.toml`: reading, checking and writing a [`Rig`].
+
+use super::rig::Rig;
+use super::whole_file::write_whole_bytes;
+use super::{FileError, toml_text};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+const REMEDY: &str = "see the rig.toml of the README for the keys and their units";
+
+/// Reads a rig and checks that it could exist.
+///
+/// # Errors
+/// One line naming the file and the line or key: unreadable, not TOML, an unknown, missing or
+/// mistyped key, or a value that no rig has (a distance of zero, a sample larger than its marks, a
+/// reflectance above one).
+pub fn read_rig(path: &Path) -> Result<Rig, FileError> {
+    let rig: Rig = toml_text::read(path, REMEDY)?;
+    check_rig(&rig).map_err(|wrong| {
+        FileError::new(path, wrong.problem, wrong.remedy).at(format_args!("key {}", wrong.key))
+    })?;
+    Ok(rig)
+}
+
+/// Writes a rig whole.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_rig(path: &Path, rig: &Rig) -> Result<(), FileError> {
+    let text = toml::to_string(rig)
+        .map_err(|error| FileError::new(path, error, "check the rig's values"))?;
+    write_whole_bytes(path, text.as_bytes())
+}
+
+/// A value that no rig has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {problem}; {remedy}")]
+pub struct RigError {
+    /// The key in `rig.toml`, with its table.
+    pub key: &'static str,
+    /// What is wrong with its value.
+    pub problem: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// Checks that a rig could exist, whoever made it.
+///
+/// # Errors
+/// The first value that is not possible, in the order of the file.
+pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
+    let Rig {
+        light,
+        camera,
+        target,
+        reference,
+        sampling,
+    } = rig;
+    within("light.distance_m", light.distance_m, 0.01..=1000.0, "m")?;
+    within("camera.distance_m", camera.distance_m, 0.01..=1000.0, "m")?;
+    let sides = 16.0..=65_536.0;
+    within(
+        "camera.width_px",
+        camera.width_px as f64,
+        sides.clone(),
+        "px",
+    )?;
+    within("camera.height_px", camera.height_px as f64, sides, "px")?;
+    within("camera.focal_px", camera.focal_px, 1.0..=1e6, "px")?;
+    for (centre, side) in camera
+        .centre_px
+        .into_iter()
+        .zip([camera.width_px, camera.height_px])
+    {
+        // A shifted lens can put the principal point outside of the frame, but not far.
+        let side = side as f64;
+        within("camera.centre_px", centre, -side..=2.0 * side, "px")?;
+    }
+    within("camera.k1", camera.k1, -10.0..=10.0, "")?;
+    within("camera.k2", camera.k2, -10.0..=10.0, "")?;
+
+    within(
+        "target.line_offset_mm",
+        target.line_offset_mm,
+        0.1..=1e5,
+        "mm",
+    )?;
+    let offset = target.line_offset_mm;
+    within(
+        "target.line_width_mm",
+        target.line_width_mm,
+        0.001..=offset,
+        "mm",
+    )?;
+    within(
+        "target.material_half_mm",
+        target.material_half_mm,
+        0.1..=1e5,
+        "mm",
+    )?;
+    let inner_edge = offset - 0.5 * target.line_width_mm;
+    if target.material_half_mm > inner_edge {
+        return Err(RigError {
+            key: "target.material_half_mm",
+            problem: format!(
+                "the sample ({} mm) reaches beyond the inner edge of the lines ({inner_edge} mm)",
+                target.material_half_mm
+            ),
+            remedy: "measure both from the centre of the target".into(),
+        });
+    }
+
+    if let Some(reference) = reference {
+        for rho in reference.reflectance {
+            within("reference.reflectance", rho, f64::MIN_POSITIVE..=1.0, "")?;
+        }
+    }
+
+    within(
+        "sampling.disc_radius_mm",
+        sampling.disc_radius_mm,
+        0.1..=1e5,
+        "mm",
+    )?;
+    let diameter = 2.0 * sampling.disc_radius_mm;
+    // At most four million points a frame.
+    within(
+        "sampling.grid_mm",
+        sampling.grid_mm,
+        diameter / 2000.0..=diameter,
+        "mm",
+    )?;
+    within(
+        "sampling.patch_mm",
+        sampling.patch_mm,
+        0.001..=diameter,
+        "mm",
+    )?;
+    if sampling.disc_radius_mm > target.material_half_mm {
+        return Err(RigError {
+            key: "sampling.disc_radius_mm",
+            problem: format!(
+                "the disc ({} mm) reaches beyond the sample ({} mm)",
+                sampling.disc_radius_mm, target.material_half_mm
+            ),
+            remedy: "make it at most target.material_half_mm".into(),
+        });
+    }
+    let arms_mm = 1000.0 * light.distance_m.min(camera.distance_m);
+    if sampling.disc_radius_mm >= arms_mm {
+        return Err(RigError {
+            key: "sampling.disc_radius_mm",
+            problem: format!(
+                "the disc ({} mm) is wider than the shorter arm ({arms_mm} mm)",
+                sampling.disc_radius_mm
+            ),
+            remedy: "check the units: distances of the arms are in metres".into(),
+        });
+    }
+    Ok(())
+}
+
+fn within(
+    key: &'static str,
+    value: f64,
+    range: RangeInclusive<f64>,
+    unit: &str,
+) -> Result<(), RigError> {
+    // Written so that a NaN is outside of every range.
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let (least, most) = (range.start(), range.end());
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    let remedy = if *least == f64::MIN_POSITIVE {
+        format!("give more than 0 and at most {most}{unit}")
+    } else {
+        format!("give a value from {least} to {most}{unit}")
+    };
+    Err(RigError {
+        key,
+        problem: format!("{value}{unit} is not possible"),
+        remedy,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rig::Reference;
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Rig, FileError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rig.toml");
+        std::fs::write(&path, text).unwrap();
+        read_rig(&path)
+    }
+
+    fn paper_text() -> String {
+        toml::to_string(&Rig::paper(1024)).unwrap()
+    }
+
+    #[test]
+    fn a_rig_comes_back_as_it_was_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rig.toml");
+        let mut rig = Rig::paper(400);
+        rig.camera.k1 = -0.02;
+        rig.reference = Some(Reference {
+            reflectance: [0.99, 0.98, 1.0],
+        });
+        write_rig(&path, &rig).unwrap();
+        assert_eq!(read_rig(&path).unwrap(), rig);
+    }
+
+    #[test]
+    fn unknown_missing_and_mistyped_keys_name_their_line() {
+        let unknown = paper_text().replace("focal_px", "focal_mm");
+        let error = read_text(&unknown).unwrap_err().to_string();
+        assert!(
+            error.contains("line 8") && error.contains("focal_mm"),
+            "{error}"
+        );
+
+        let mistyped = paper_text().replace("width_px = 1024", "width_px = \"wide\"");
+        let error = read_text(&mistyped).unwrap_err().to_string();
+        assert!(
+            error.contains("line 6") && error.contains("string"),
+            "{error}"
+        );
+
+        let missing = paper_text().replace("distance_m = 1.1\n", "");
+        let error = read_text(&missing).unwrap_err().to_string();
+        assert!(
+            error.contains("line 1") && error.contains("distance_m"),
+            "{error}"
+        );
+        for text in [unknown, mistyped, missing] {
+            assert_eq!(read_text(&text).unwrap_err().to_string().lines().count(), 1);
+        }
+    }
+
+    #[test]
+    fn values_that_no_rig_has_name_their_key() {
+        for (from, to, key) in [
+            ("distance_m = 1.1", "distance_m = 0.0", "light.distance_m"),
+            ("distance_m = 1.8", "distance_m = -1.8", "camera.distance_m"),
+            ("distance_m = 1.8", "distance_m = nan", "camera.distance_m"),
+            ("width_px = 1024", "width_px = 0", "camera.width_px"),
+            ("focal_px = 1600.0", "focal_px = inf", "camera.focal_px"),
+            (
+                "material_half_mm = 320.0",
+                "material_half_mm = 334.0",
+                "target.material_half_mm",
+            ),
+            (
+                "disc_radius_mm = 277.0",
+                "disc_radius_mm = 330.0",
+                "sampling.disc_radius_mm",
+            ),
+            ("grid_mm = 14.0", "grid_mm = 0.0", "sampling.grid_mm"),
+            (
+                "distance_m = 1.1",
+                "distance_m = 0.2",
+                "sampling.disc_radius_mm",
+            ),
+        ] {
+            let text = paper_text();
+            assert!(text.contains(from), "{from}");
+            let error = read_text(&text.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(&format!("key {key}:")), "{to}: {error}");
+        }
+        for rho in ["0.0", "1.01", "-0.5", "nan"] {
+            let text = format!(
+                "{}\n[reference]\nreflectance = [0.9, {rho}, 0.9]\n",
+                paper_text()
+            );
+            let error = read_text(&text).unwrap_err().to_string();
+            assert!(error.contains("key reference.reflectance:"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Directional lights.
+
+use gonia_brdf::direction::{Vec3, normalize};
+use std::f64::consts::PI;
+
+/// A light at infinity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector towards it, in camera space.
+    pub towards: Vec3,
+    /// Irradiance it gives a surface that faces it, per channel. π makes a white Lambertian one.
+    pub irradiance: [f64; 3],
+}
+
+/// A single light from above the camera, 40° from the line of sight.
+pub fn single() -> Vec<Light> {
+    let (s, c) = 40f64.to_radians().sin_cos();
+    vec![Light {
+        towards: [0.0, s, c],
+        irradiance: [PI; 3],
+    }]
+}
+
+/// A key light from the upper left, a fill from the right, a rim from behind, and a soft dome.
+pub fn studio() -> Vec<Light> {
+    let light = |towards: Vec3, white: f64| Light {
+        towards: normalize(towards),
+        irradiance: [white * PI; 3],
+    };
+    let mut lights = vec![
+        light([-0.55, 0.60, 0.65], 0.75),
+        light([0.80, 0.10, 0.55], 0.22),
+        light([0.35, 0.75, -0.45], 0.45),
+    ];
+    lights.extend(dome(DOME_LIGHTS, 0.25));
+    lights
+}
+
+const DOME_LIGHTS: usize = 20;
+
+/// Lights spread evenly over the upper half of space (a Fibonacci spiral), brighter towards the
+/// zenith; together they give a surface that faces up about `white` of a white one.
+fn dome(n: usize, white: f64) -> Vec<Light> {
+    let golden = PI * (3.0 - 5f64.sqrt());
+    (0..n)
+        .map(|k| {
+            let y = (k as f64 + 0.5) / n as f64;
+            let r = (1.0 - y * y).sqrt();
+            let (s, c) = (golden * k as f64).sin_cos();
+            let share = (0.4 + 0.6 * y) / n as f64 / 0.4;
+            Light {
+                towards: [r * c, y, r * s],
+                irradiance: [white * PI * share; 3],
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_light_is_a_unit_vector_and_the_dome_keeps_its_promise() {
+        for light in studio().iter().chain(&single()) {
+            let [x, y, z] = light.towards;
+            assert!((x * x + y * y + z * z - 1.0).abs() < 1e-12);
+        }
+        let up: f64 = dome(400, 0.25)
+            .iter()
+            .map(|l| l.irradiance[0] * l.towards[1])
+            .sum();
+        assert!((up / PI - 0.25).abs() < 1e-3, "{}", up / PI);
+    }
+}
