@@ -24,3 +24,25 @@ pub mod profile;
 pub mod settings;
 pub mod settle;
 pub mod train;
+
+/// Version of this firmware: major, minor, patch.
+pub const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+/// State of the sources that this was built from, from `GONIA_GIT` at build time.
+pub fn git_state() -> heapless::String<16> {
+    let state = option_env!("GONIA_GIT").unwrap_or("unknown");
+    state.chars().take(16).filter(char::is_ascii).collect()
+}
+
+const fn number(digits: &str) -> u8 {
+    let (digits, mut value, mut i) = (digits.as_bytes(), 0, 0);
+    while i < digits.len() {
+        value = value * 10 + (digits[i] - b'0');
+        i += 1;
+    }
+    value
+}

@@ -140,7 +140,8 @@ mod tests {
             } else {
                 2.0 * (d / a).sqrt()
             };
-            let tolerance = 0.01 * expected + 0.006;
+            // The first step comes early, by a fixed time.
+            let tolerance = 0.01 * expected + 0.01;
             assert!(
                 (t_us * 1e-6 - expected).abs() < tolerance,
                 "{steps}: {} {expected}",
