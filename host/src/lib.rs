@@ -2,6 +2,7 @@
 //!
 //! Data flows one way: `plan → poses → [link → arms] → frames → registration → samples →
 //! compensation → bins → interpolation → dense BRDF → EXR, pictures, report`.
+pub mod capture;
 pub mod dataset;
 pub mod evaluate;
 pub mod link;

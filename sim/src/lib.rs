@@ -1,2 +1,25 @@
 //! The simulated rig: plant and wire of the two controllers, and the scene that the camera sees.
+//!
+//! | room | subject |
+//! |---|---|
+//! | [`plant`] | motor, gear, shaft, encoder and switch of one axis (`no_std`) |
+//! | [`bench`](mod@bench) | two such axes behind the firmware's hardware trait (`no_std`) |
+//! | [`fault`] | what may go wrong, as data |
+//! | `wire` | bytes under way between host and controller |
+//! | [`rig`] | two real controllers on their plants, in virtual time |
+//! | [`scene`] | what the camera sees |
+#![cfg_attr(not(feature = "std"), no_std)]
+
+pub mod bench;
+pub mod plant;
+
+#[cfg(feature = "std")]
+pub mod fault;
+#[cfg(feature = "std")]
+pub mod rig;
+#[cfg(feature = "std")]
 pub mod scene;
+#[cfg(feature = "std")]
+mod wire;
+#[cfg(feature = "std")]
+mod world;

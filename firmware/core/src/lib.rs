@@ -1,2 +1,48 @@
-//! The arm controller's logic: no hardware, no clock of its own.
+//! The arm controller's logic: no hardware, no clock of its own, no allocation.
+//!
+//! Bytes go in through [`node::Node::receive`], time through [`node::Node::poll`]; pins, encoders
+//! and flash are behind [`hardware::Hardware`]. The same code runs on a board and in the simulator.
+//!
+//! | room | subject |
+//! |---|---|
+//! | [`node`] | the wire's end: frames to commands, answers and events to frames |
+//! | [`controller`] | the states and their one owner |
+//! | [`axis`] | one axis: steps, encoder, segments of a move |
+//! | [`profile`] | when the next step is due |
+//! | [`homing`], [`settle`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
+//! | [`settings`] | values of the settings, as bytes for flash too |
+//! | [`hardware`], [`pins`] | what a board must offer, and step/direction pins over `embedded-hal` |
 #![no_std]
+
+pub mod axis;
+pub mod controller;
+pub mod hardware;
+pub mod homing;
+pub mod node;
+pub mod pins;
+pub mod profile;
+pub mod settings;
+pub mod settle;
+pub mod train;
+
+/// Version of this firmware: major, minor, patch.
+pub const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+/// State of the sources that this was built from, from `GONIA_GIT` at build time.
+pub fn git_state() -> heapless::String<16> {
+    let state = option_env!("GONIA_GIT").unwrap_or("unknown");
+    state.chars().take(16).filter(char::is_ascii).collect()
+}
+
+const fn number(digits: &str) -> u8 {
+    let (digits, mut value, mut i) = (digits.as_bytes(), 0, 0);
+    while i < digits.len() {
+        value = value * 10 + (digits[i] - b'0');
+        i += 1;
+    }
+    value
+}

@@ -1,0 +1,315 @@
+//! One axis: steps given, encoder followed, segments of a move.
+
+use gonia_protocol::fault::FaultCode;
+use gonia_protocol::message::AxisStatus;
+use gonia_protocol::settings::{Axis, Key};
+
+use crate::hardware::Hardware;
+use crate::profile::{Profile, Ramp, TICKS_PER_US};
+use crate::settings::Settings;
+
+const TURN_UDEG: i64 = 360_000_000;
+/// Bad readings in a row that make a fault; fewer are left out.
+const MAX_BAD_READINGS: u8 = 3;
+/// Movement between two readings that is always plausible: noise, a knock, ringing.
+const ALWAYS_PLAUSIBLE_UDEG: i64 = 200_000;
+
+/// Steps and encoder of one axis.
+#[derive(Debug)]
+pub struct AxisDrive {
+    axis: Axis,
+    profile: Option<Profile>,
+    forward: bool,
+    due_ticks: u64,
+    /// The way from below, after a segment that went down.
+    take_up: Option<(u32, Ramp)>,
+    steps: i64,
+    base_steps: i64,
+    base_udeg: i64,
+    steps_per_turn: i64,
+    encoder: Encoder,
+    following_udeg: i32,
+    corrections: u32,
+    missed_steps: u32,
+}
+
+/// The unwrapped encoder.
+#[derive(Debug, Default)]
+struct Encoder {
+    raw: Option<u32>,
+    counts: i64,
+    udeg: i32,
+    read_us: u64,
+    bad_readings: u8,
+}
+
+/// A reading of the encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// Good.
+    Fresh,
+    /// Bad; the last good position still stands.
+    Stale,
+}
+
+impl AxisDrive {
+    /// An axis at rest that has not been read yet.
+    pub fn new(axis: Axis, settings: &Settings) -> Self {
+        Self {
+            axis,
+            profile: None,
+            forward: true,
+            due_ticks: u64::MAX,
+            take_up: None,
+            steps: 0,
+            base_steps: 0,
+            base_udeg: 0,
+            steps_per_turn: i64::from(settings.get(axis, Key::StepsPerTurn)),
+            encoder: Encoder::default(),
+            following_udeg: 0,
+            corrections: 0,
+            missed_steps: 0,
+        }
+    }
+
+    /// Which axis this is.
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+
+    /// Whether steps are being given.
+    pub fn is_moving(&self) -> bool {
+        self.profile.is_some()
+    }
+
+    /// Time of the next step, µs; `u64::MAX` at rest.
+    pub fn wake_us(&self) -> u64 {
+        if self.due_ticks == u64::MAX {
+            u64::MAX
+        } else {
+            self.due_ticks.div_ceil(TICKS_PER_US)
+        }
+    }
+
+    /// Where the encoder says the axis is, µdeg.
+    pub fn encoder_udeg(&self) -> i32 {
+        self.encoder.udeg
+    }
+
+    /// Where the steps say it is, counted from where the encoder was when the run began, µdeg.
+    pub fn commanded_udeg(&self) -> i32 {
+        let turned = (self.steps - self.base_steps) * TURN_UDEG / self.steps_per_turn;
+        (self.base_udeg + turned) as i32
+    }
+
+    /// For people.
+    pub fn status(&self) -> AxisStatus {
+        AxisStatus {
+            commanded_udeg: self.commanded_udeg(),
+            encoder_udeg: self.encoder_udeg(),
+            following_udeg: self.following_udeg,
+            corrections: self.corrections,
+            missed_steps: self.missed_steps,
+        }
+    }
+
+    /// Gives every step that is due.
+    pub fn give_steps(&mut self, now_us: u64, hardware: &mut impl Hardware) {
+        let now_ticks = now_us * TICKS_PER_US;
+        while self.due_ticks <= now_ticks {
+            let Some(profile) = &mut self.profile else {
+                self.due_ticks = u64::MAX;
+                return;
+            };
+            hardware.step(self.axis, self.forward, self.due_ticks / TICKS_PER_US);
+            self.steps += if self.forward { 1 } else { -1 };
+            if profile.advance() {
+                self.due_ticks += u64::from(profile.interval());
+            } else {
+                let next = self.take_up.take();
+                let from_ticks = self.due_ticks;
+                self.begin(
+                    next.and_then(|(steps, ramp)| Profile::new(steps, ramp)),
+                    from_ticks,
+                    true,
+                );
+            }
+        }
+    }
+
+    /// Starts a run of steps, up for positive ones. Whatever was under way is dropped.
+    pub fn run(&mut self, now_us: u64, steps: i64, ramp: Ramp) {
+        self.take_up = None;
+        self.rebase();
+        let count = u32::try_from(steps.unsigned_abs()).unwrap_or(u32::MAX);
+        self.begin(Profile::new(count, ramp), now_us * TICKS_PER_US, steps > 0);
+    }
+
+    /// Starts a run to an absolute angle; the last part of the way always leads up, so that the
+    /// gear's backlash is taken from one side.
+    pub fn go_to(&mut self, now_us: u64, target_udeg: i32, settings: &Settings) {
+        let ramp = self.ramp(settings, Key::MaxSpeed);
+        let way = i64::from(target_udeg) - i64::from(self.encoder.udeg);
+        let steps = self.steps_of(way);
+        if steps >= 0 {
+            self.run(now_us, steps, ramp);
+            return;
+        }
+        let take_up = self.steps_of(i64::from(settings.get(self.axis, Key::BacklashTakeup)));
+        self.run(now_us, steps - take_up, ramp);
+        self.take_up = u32::try_from(take_up).ok().map(|up| (up, ramp));
+    }
+
+    /// Slows down and stops; nothing follows.
+    pub fn decelerate(&mut self) {
+        self.take_up = None;
+        if !self.profile.as_mut().is_some_and(Profile::decelerate) {
+            self.halt();
+        }
+    }
+
+    /// Stops at once.
+    pub fn halt(&mut self) {
+        self.take_up = None;
+        self.profile = None;
+        self.due_ticks = u64::MAX;
+    }
+
+    /// Counts a correction of an error of so many µdeg; a large one means that steps were missed.
+    pub fn note_correction(&mut self, error_udeg: i32, settings: &Settings) {
+        self.corrections += 1;
+        // Half the take-up is more than backlash and ringing leave; a lost magnetic cycle is more.
+        if error_udeg.unsigned_abs()
+            > settings.get(self.axis, Key::BacklashTakeup).unsigned_abs() / 2
+        {
+            let steps = self.steps_of(i64::from(error_udeg)).unsigned_abs();
+            self.missed_steps = self.missed_steps.saturating_add(steps as u32);
+        }
+    }
+
+    /// Compares steps and encoder: the error and whether it is within its limit.
+    pub fn is_following(&mut self, settings: &Settings) -> bool {
+        let error = self.commanded_udeg() - self.encoder.udeg;
+        self.following_udeg = self.following_udeg.max(error.saturating_abs());
+        error.saturating_abs() <= settings.get(self.axis, Key::FollowingLimit)
+    }
+
+    /// Reads the encoder. A single bad reading is left out, several in a row are a fault.
+    pub fn read(
+        &mut self,
+        now_us: u64,
+        settings: &Settings,
+        hardware: &mut impl Hardware,
+    ) -> Result<Reading, FaultCode> {
+        let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
+        let encoder = &mut self.encoder;
+        let (counts, fault) = match hardware.encoder_counts(self.axis) {
+            Ok(raw) if i64::from(raw) < turn => {
+                let zero = i64::from(settings.get(self.axis, Key::EncoderZero));
+                let Some(last_raw) = encoder.raw else {
+                    // The first reading: somewhere within half a turn of 0, until homing knows better.
+                    encoder.raw = Some(raw);
+                    encoder.read_us = now_us;
+                    encoder.set_counts(wrap(i64::from(raw) - zero, turn), turn);
+                    return Ok(Reading::Fresh);
+                };
+                let moved = wrap(i64::from(raw) - i64::from(last_raw), turn);
+                let speed = i64::from(settings.get(self.axis, Key::MaxSpeed));
+                let elapsed_us = (now_us - encoder.read_us).min(10_000_000) as i64;
+                let plausible_udeg = ALWAYS_PLAUSIBLE_UDEG + 2 * speed * elapsed_us / 1_000_000;
+                if moved.abs() * TURN_UDEG <= plausible_udeg * turn {
+                    encoder.raw = Some(raw);
+                    (Some(encoder.counts + moved), FaultCode::ENCODER_JUMP)
+                } else {
+                    (None, FaultCode::ENCODER_JUMP)
+                }
+            }
+            _ => (None, FaultCode::ENCODER_LOST),
+        };
+        if let Some(counts) = counts {
+            encoder.set_counts(counts, turn);
+            encoder.read_us = now_us;
+            encoder.bad_readings = 0;
+            return Ok(Reading::Fresh);
+        }
+        encoder.bad_readings = encoder.bad_readings.saturating_add(1);
+        if encoder.bad_readings >= MAX_BAD_READINGS {
+            Err(fault)
+        } else {
+            Ok(Reading::Stale)
+        }
+    }
+
+    /// Forgets the encoder's past, so that the next reading is taken as it is.
+    pub fn forget_encoder(&mut self) {
+        self.encoder.raw = None;
+        self.encoder.bad_readings = 0;
+    }
+
+    /// The axis stands at the home switch: chooses the encoder's turn that is nearest to the home
+    /// angle, or says that there is none within the tolerance.
+    pub fn set_turn_at_home(&mut self, settings: &Settings) -> Result<(), FaultCode> {
+        let home = i64::from(settings.get(self.axis, Key::HomeAngle));
+        let off = (i64::from(self.encoder.udeg) - home + TURN_UDEG / 2).rem_euclid(TURN_UDEG)
+            - TURN_UDEG / 2;
+        if off.abs() > i64::from(settings.get(self.axis, Key::HomeTolerance)) {
+            return Err(FaultCode::HOME_MISMATCH);
+        }
+        let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
+        let turns =
+            (home + off - i64::from(self.encoder.udeg) + TURN_UDEG / 2).div_euclid(TURN_UDEG);
+        let counts = self.encoder.counts + turns * turn;
+        self.encoder.set_counts(counts, turn);
+        self.rebase();
+        Ok(())
+    }
+
+    /// A ramp up to the speed of a key.
+    pub fn ramp(&self, settings: &Settings, speed: Key) -> Ramp {
+        Ramp::new(
+            settings.get_u64(self.axis, speed),
+            settings.get_u64(self.axis, Key::Acceleration),
+            self.steps_per_turn.unsigned_abs(),
+        )
+    }
+
+    /// An angle in steps, rounded to the nearest.
+    pub fn steps_of(&self, udeg: i64) -> i64 {
+        (udeg * self.steps_per_turn + TURN_UDEG / 2).div_euclid(TURN_UDEG)
+    }
+
+    /// Takes up settings that may have changed. Only at rest.
+    pub fn apply(&mut self, settings: &Settings) {
+        self.steps_per_turn = i64::from(settings.get(self.axis, Key::StepsPerTurn));
+        self.rebase();
+        self.forget_encoder();
+    }
+
+    /// Starts a new move: the following error counts from here.
+    pub fn clear_following(&mut self) {
+        self.following_udeg = 0;
+    }
+
+    fn begin(&mut self, profile: Option<Profile>, from_ticks: u64, forward: bool) {
+        self.due_ticks = profile.map_or(u64::MAX, |p| from_ticks + u64::from(p.interval()));
+        self.profile = profile;
+        self.forward = forward;
+    }
+
+    fn rebase(&mut self) {
+        self.base_steps = self.steps;
+        self.base_udeg = i64::from(self.encoder.udeg);
+    }
+}
+
+impl Encoder {
+    fn set_counts(&mut self, counts: i64, turn: i64) {
+        self.counts = counts;
+        self.udeg = (counts * TURN_UDEG).div_euclid(turn) as i32;
+    }
+}
+
+/// A difference of counts as the shorter way round.
+fn wrap(counts: i64, turn: i64) -> i64 {
+    (counts + turn / 2).rem_euclid(turn) - turn / 2
+}

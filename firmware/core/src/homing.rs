@@ -1,0 +1,158 @@
+//! How one axis finds home: fast seek, back off, slow approach, zero.
+//!
+//! The switch is closed at and below the home angle. It tells only *which turn* the shaft is in;
+//! the angle within the turn is the absolute encoder's, so the switch's own repeatability (some
+//! 0.01°) does not enter the zero.
+
+use gonia_protocol::fault::FaultCode;
+use gonia_protocol::settings::Key;
+
+use crate::axis::AxisDrive;
+use crate::settings::Settings;
+
+/// Equal readings that end a bounce of the switch (at one reading every 2 ms).
+const DEBOUNCE: u8 = 3;
+/// The slow way off the switch is this part of the fast search's speed.
+const CLEARING_SLOWDOWN: u64 = 4;
+/// How many back-offs below the switch an axis may stand at the start.
+const MAX_BELOW: i64 = 10;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Fast, down, until the switch closes.
+    Seek,
+    /// Slowing down below the switch.
+    Stop,
+    /// Up, until the switch opens.
+    Clear,
+    /// Slowing down above it.
+    StopAbove,
+    /// A little further up.
+    BackOff,
+    /// Slowly down, until it closes again.
+    Approach,
+    /// Home is known; on to the lowest admissible angle.
+    Park,
+    Done,
+}
+
+/// The search of one axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Homing {
+    phase: Phase,
+    same_readings: u8,
+    last_reading: bool,
+}
+
+impl Homing {
+    /// Begins, with the axis at rest.
+    pub fn begin(
+        now_us: u64,
+        switch_closed: bool,
+        drive: &mut AxisDrive,
+        settings: &Settings,
+    ) -> Self {
+        let mut homing = Self {
+            phase: Phase::Done,
+            same_readings: 0,
+            last_reading: switch_closed,
+        };
+        if switch_closed {
+            homing.clear(now_us, drive, settings);
+        } else {
+            homing.phase = Phase::Seek;
+            let axis = drive.axis();
+            // The whole travel, and a tenth more.
+            let travel = i64::from(settings.get(axis, Key::SoftMax))
+                - i64::from(settings.get(axis, Key::HomeAngle));
+            let ramp = drive.ramp(settings, Key::HomeFastSpeed);
+            drive.run(now_us, -drive.steps_of(travel * 11 / 10), ramp);
+        }
+        homing
+    }
+
+    /// Whether this axis is home and at rest.
+    pub fn is_done(&self) -> bool {
+        self.phase == Phase::Done
+    }
+
+    /// Looks at switch and motion, every control tick.
+    pub fn tick(
+        &mut self,
+        now_us: u64,
+        switch_closed: bool,
+        drive: &mut AxisDrive,
+        settings: &Settings,
+    ) -> Result<(), FaultCode> {
+        let steady = self.is_steady(switch_closed);
+        let backoff = i64::from(settings.get(drive.axis(), Key::HomeBackoff));
+        match self.phase {
+            Phase::Seek if switch_closed && steady => {
+                drive.decelerate();
+                self.phase = Phase::Stop;
+            }
+            Phase::Seek if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            Phase::Stop if !drive.is_moving() => self.clear(now_us, drive, settings),
+            Phase::Clear if !switch_closed && steady => {
+                drive.decelerate();
+                self.phase = Phase::StopAbove;
+            }
+            Phase::Clear if !drive.is_moving() => return Err(FaultCode::HOME_SWITCH_STUCK),
+            Phase::StopAbove if !drive.is_moving() => {
+                drive.run(
+                    now_us,
+                    drive.steps_of(backoff),
+                    clearing_ramp(drive, settings),
+                );
+                self.phase = Phase::BackOff;
+            }
+            Phase::BackOff if !drive.is_moving() => {
+                if switch_closed {
+                    return Err(FaultCode::HOME_SWITCH_STUCK);
+                }
+                let ramp = drive.ramp(settings, Key::HomeSlowSpeed);
+                drive.run(now_us, -drive.steps_of(backoff * 3), ramp);
+                self.phase = Phase::Approach;
+            }
+            // The first contact counts, bounce or not: the encoder has the angle.
+            Phase::Approach if switch_closed => {
+                drive.halt();
+                drive.set_turn_at_home(settings)?;
+                drive.go_to(now_us, settings.get(drive.axis(), Key::SoftMin), settings);
+                self.phase = Phase::Park;
+            }
+            Phase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            Phase::Park if !drive.is_moving() => self.phase = Phase::Done,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn clear(&mut self, now_us: u64, drive: &mut AxisDrive, settings: &Settings) {
+        let get = |key| i64::from(settings.get(drive.axis(), key));
+        // What the fast search ran past the switch: v²/2a.
+        let overrun = get(Key::HomeFastSpeed).pow(2) / (2 * get(Key::Acceleration)).max(1);
+        let way = overrun + MAX_BELOW * get(Key::HomeBackoff);
+        drive.run(now_us, drive.steps_of(way), clearing_ramp(drive, settings));
+        self.same_readings = 0;
+        self.phase = Phase::Clear;
+    }
+
+    fn is_steady(&mut self, reading: bool) -> bool {
+        if reading == self.last_reading {
+            self.same_readings = self.same_readings.saturating_add(1);
+        } else {
+            self.last_reading = reading;
+            self.same_readings = 1;
+        }
+        self.same_readings >= DEBOUNCE
+    }
+}
+
+fn clearing_ramp(drive: &AxisDrive, settings: &Settings) -> crate::profile::Ramp {
+    crate::profile::Ramp::new(
+        settings.get_u64(drive.axis(), Key::HomeFastSpeed) / CLEARING_SLOWDOWN,
+        settings.get_u64(drive.axis(), Key::Acceleration),
+        settings.get_u64(drive.axis(), Key::StepsPerTurn),
+    )
+}

@@ -1,0 +1,182 @@
+//! Values of the settings, and their form in flash.
+//!
+//! In flash: format version, number of keys, two `i32` a key (little endian), CRC-32C of all that.
+//! Keys that a stored block does not have yet get their defaults, so that newer firmware reads what
+//! older firmware wrote.
+
+use gonia_protocol::crc32c;
+use gonia_protocol::settings::{Axis, Key, MEANINGS, N_SETTINGS};
+
+const FORMAT: u8 = 1;
+const HEAD: usize = 2;
+
+/// Length of the stored form.
+pub const STORED_LEN: usize = HEAD + N_SETTINGS * 8 + 4;
+
+/// The settings of both axes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    values: [[i32; 2]; N_SETTINGS],
+}
+
+/// A value out of range, or one that contradicts another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BadValue;
+
+/// Stored bytes that are no settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Damaged;
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            values: MEANINGS.map(|meaning| meaning.default),
+        }
+    }
+}
+
+impl Settings {
+    /// A value, in the key's unit.
+    pub fn get(&self, axis: Axis, key: Key) -> i32 {
+        self.values[key as usize][axis.index()]
+    }
+
+    /// A value that is never negative, in the key's unit.
+    pub fn get_u64(&self, axis: Axis, key: Key) -> u64 {
+        self.get(axis, key).max(0) as u64
+    }
+
+    /// Changes a value, or nothing. A setting of the node changes for both axes.
+    pub fn set(&mut self, axis: Axis, key: Key, value: i32) -> Result<(), BadValue> {
+        let mut changed = self.clone();
+        if key.is_of_the_node() {
+            changed.values[key as usize] = [value; 2];
+        } else {
+            changed.values[key as usize][axis.index()] = value;
+        }
+        changed.check()?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// Checksum, for comparing a controller with the record of a session.
+    pub fn crc(&self) -> u32 {
+        let bytes = self.to_bytes();
+        crc32c(&bytes[..STORED_LEN - 4])
+    }
+
+    /// The stored form.
+    pub fn to_bytes(&self) -> [u8; STORED_LEN] {
+        let mut bytes = [0; STORED_LEN];
+        bytes[0] = FORMAT;
+        bytes[1] = N_SETTINGS as u8;
+        for (chunk, value) in bytes[HEAD..]
+            .chunks_exact_mut(4)
+            .zip(self.values.as_flattened())
+        {
+            chunk.copy_from_slice(&value.to_le_bytes());
+        }
+        let crc = crc32c(&bytes[..STORED_LEN - 4]);
+        bytes[STORED_LEN - 4..].copy_from_slice(&crc.to_le_bytes());
+        bytes
+    }
+
+    /// Reads the stored form, also a shorter one of older firmware.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Damaged> {
+        let &[FORMAT, n_keys, ..] = bytes else {
+            return Err(Damaged);
+        };
+        let end = HEAD + n_keys as usize * 8;
+        let (block, crc) = bytes.split_at_checked(end).ok_or(Damaged)?;
+        if n_keys as usize > N_SETTINGS || crc.get(..4) != Some(&crc32c(block).to_le_bytes()[..]) {
+            return Err(Damaged);
+        }
+        let mut settings = Self::default();
+        let values = settings.values.as_flattened_mut().iter_mut();
+        for (value, chunk) in values.zip(block[HEAD..].as_chunks::<4>().0) {
+            *value = i32::from_le_bytes(*chunk);
+        }
+        settings.check().map_err(|_| Damaged)?;
+        Ok(settings)
+    }
+
+    fn check(&self) -> Result<(), BadValue> {
+        for axis in Axis::BOTH {
+            let get = |key| self.get(axis, key);
+            let in_range = MEANINGS
+                .iter()
+                .all(|m| (m.min..=m.max).contains(&get(m.key)));
+            let consistent = get(Key::SoftMin) < get(Key::SoftMax)
+                && get(Key::HomeAngle) <= get(Key::SoftMin)
+                && get(Key::EncoderZero) < get(Key::EncoderCountsPerTurn)
+                && get(Key::HomeSlowSpeed) <= get(Key::HomeFastSpeed)
+                && get(Key::HomeFastSpeed) <= get(Key::MaxSpeed)
+                && get(Key::Deadband) <= get(Key::TriggerWindow)
+                && get(Key::TriggerWindow) <= get(Key::FollowingLimit);
+            if !in_range || !consistent {
+                return Err(BadValue);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stored_settings_come_back() {
+        let mut settings = Settings::default();
+        settings.set(Axis::Phi, Key::MaxSpeed, 20_000_000).unwrap();
+        settings.set(Axis::Phi, Key::Lease, 500_000).unwrap();
+        assert_eq!(settings.get(Axis::Theta, Key::Lease), 500_000);
+        assert_eq!(
+            Settings::from_bytes(&settings.to_bytes()),
+            Ok(settings.clone())
+        );
+        assert_ne!(settings.crc(), Settings::default().crc());
+    }
+
+    #[test]
+    fn any_torn_or_bent_block_is_noticed() {
+        let bytes = Settings::default().to_bytes();
+        for length in 0..STORED_LEN {
+            assert_eq!(Settings::from_bytes(&bytes[..length]), Err(Damaged));
+        }
+        for at in 0..STORED_LEN {
+            let mut bent = bytes;
+            bent[at] ^= 0x10;
+            assert_eq!(Settings::from_bytes(&bent), Err(Damaged), "byte {at}");
+        }
+    }
+
+    #[test]
+    fn a_block_of_older_firmware_gets_defaults_for_its_missing_keys() {
+        let mut settings = Settings::default();
+        settings
+            .set(Axis::Theta, Key::StepsPerTurn, 288_000)
+            .unwrap();
+        let mut older = [0; HEAD + 8 + 4];
+        older[..HEAD + 8].copy_from_slice(&settings.to_bytes()[..HEAD + 8]);
+        older[1] = 1;
+        let crc = crc32c(&older[..HEAD + 8]);
+        older[HEAD + 8..].copy_from_slice(&crc.to_le_bytes());
+        assert_eq!(Settings::from_bytes(&older), Ok(settings));
+    }
+
+    #[test]
+    fn values_that_make_no_sense_change_nothing() {
+        let mut settings = Settings::default();
+        for (key, value) in [
+            (Key::MaxSpeed, 0),
+            (Key::SoftMin, 91_000_000),
+            (Key::HomeAngle, 0),
+            (Key::TriggerWindow, 31_000),
+            (Key::Deadband, i32::MIN),
+        ] {
+            assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue));
+        }
+        assert_eq!(settings, Settings::default());
+    }
+}

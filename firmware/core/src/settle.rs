@@ -1,0 +1,142 @@
+//! How one axis comes to rest: a target is reached only when the encoder has stayed within the
+//! deadband for the whole window.
+
+/// Limits of settling, from the settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest error, µdeg.
+    pub deadband_udeg: i32,
+    /// How long the error must stay within it, µs.
+    pub window_us: u64,
+    /// How long ringing may last before a correction, µs.
+    pub patience_us: u64,
+}
+
+/// Evaluations without either outcome after which settling is given up.
+const MAX_EVALUATIONS: u32 = 50;
+
+/// Watches one axis after its motion.
+#[derive(Clone, Copy, Debug)]
+pub struct Settle {
+    limits: Limits,
+    inside_since_us: u64,
+    evaluation_us: u64,
+    last_outside_us: Option<u64>,
+    error_sum: i64,
+    error_count: i32,
+    evaluations: u32,
+}
+
+/// What the watch says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Not yet.
+    Wait,
+    /// Within the deadband for the whole window, up to now.
+    Reached,
+    /// At rest, but off by so many µdeg (encoder − target).
+    Off(i32),
+    /// It neither comes to rest nor stays away.
+    Restless,
+}
+
+impl Settle {
+    /// The motion has just ended.
+    pub fn new(now_us: u64, limits: Limits) -> Self {
+        Self {
+            limits,
+            inside_since_us: now_us,
+            evaluation_us: now_us,
+            last_outside_us: None,
+            error_sum: 0,
+            error_count: 0,
+            evaluations: 0,
+        }
+    }
+
+    /// Takes a reading: encoder − target.
+    pub fn reading(&mut self, now_us: u64, error_udeg: i32) -> Verdict {
+        if error_udeg.unsigned_abs() > self.limits.deadband_udeg.unsigned_abs() {
+            self.inside_since_us = now_us;
+            self.last_outside_us = Some(now_us);
+        } else if now_us - self.inside_since_us >= self.limits.window_us {
+            return Verdict::Reached;
+        }
+        let half = self.evaluation_us + self.limits.patience_us / 2;
+        if now_us >= half {
+            self.error_sum += i64::from(error_udeg);
+            self.error_count += 1;
+        }
+        if now_us < self.evaluation_us + self.limits.patience_us {
+            return Verdict::Wait;
+        }
+        self.evaluate(now_us, half)
+    }
+
+    /// Ringing has had its time: judges the second half of it.
+    fn evaluate(&mut self, now_us: u64, half_us: u64) -> Verdict {
+        let mean = (self.error_sum / i64::from(self.error_count.max(1))) as i32;
+        let was_outside = self.last_outside_us.is_some_and(|at| at >= half_us);
+        self.evaluation_us = now_us;
+        self.error_sum = 0;
+        self.error_count = 0;
+        self.evaluations += 1;
+        if was_outside && mean.unsigned_abs() > self.limits.deadband_udeg.unsigned_abs() / 2 {
+            Verdict::Off(mean)
+        } else if self.evaluations > MAX_EVALUATIONS {
+            Verdict::Restless
+        } else {
+            Verdict::Wait
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits {
+        deadband_udeg: 6000,
+        window_us: 100_000,
+        patience_us: 160_000,
+    };
+
+    fn watch(error: impl Fn(u64) -> i32) -> (u64, Verdict) {
+        let mut settle = Settle::new(0, LIMITS);
+        (0..)
+            .map(|i| i * 2000)
+            .find_map(|t| match settle.reading(t, error(t)) {
+                Verdict::Wait => None,
+                verdict => Some((t, verdict)),
+            })
+            .unwrap()
+    }
+
+    #[test]
+    fn reached_means_the_whole_window() {
+        assert_eq!(watch(|_| 6000), (100_000, Verdict::Reached));
+        // One reading outside starts the window anew.
+        let (t, verdict) = watch(|t| if t == 90_000 { 6001 } else { 0 });
+        assert_eq!((t, verdict), (190_000, Verdict::Reached));
+    }
+
+    #[test]
+    fn ringing_that_dies_down_needs_no_correction() {
+        let (t, verdict) = watch(|t| (20_000.0 * (-(t as f64) / 50_000.0).exp()) as i32);
+        assert_eq!(verdict, Verdict::Reached);
+        assert!((150_000..200_000).contains(&t), "{t}");
+    }
+
+    #[test]
+    fn a_steady_error_is_reported_with_its_mean() {
+        assert_eq!(watch(|_| -9000), (160_000, Verdict::Off(-9000)));
+    }
+
+    #[test]
+    fn an_arm_that_never_rests_is_given_up() {
+        assert_eq!(
+            watch(|t| if t % 4000 == 0 { 20_000 } else { -20_000 }).1,
+            Verdict::Restless
+        );
+    }
+}

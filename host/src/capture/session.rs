@@ -1,0 +1,223 @@
+//! Every pose of a list, one after the other.
+
+use gonia_brdf::Pose;
+use gonia_brdf::direction::Direction;
+use gonia_protocol::message::{Refusal, State};
+
+use super::arms::{Arms, HomeError, Try};
+use super::timing::POINTING_LIMIT_DEG;
+use crate::link::LinkError;
+
+/// A shot that is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shot {
+    /// Its pose's place in the list.
+    pub index: usize,
+    /// Where the arms were by encoder at the last pulse.
+    pub encoder: Pose,
+    /// The largest |commanded − encoder| of all axes and pulses, degrees.
+    pub pointing_error_deg: f64,
+    /// How often it had to be taken again.
+    pub retakes: u32,
+}
+
+/// What came of a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ShotOutcome {
+    /// Within the pointing limit, by encoder.
+    Kept(Shot),
+    /// Given up.
+    Refused {
+        /// Its pose's place in the list.
+        index: usize,
+        /// Why, in words for people.
+        reason: String,
+    },
+}
+
+/// A session in figures.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SessionSummary {
+    /// Shots kept.
+    pub kept: usize,
+    /// Poses given up.
+    pub refused: usize,
+    /// Shots taken again.
+    pub retakes: u32,
+    /// Faults, restarts and lost cables that were got over.
+    pub recoveries: u32,
+    /// The largest pointing error of the kept shots, degrees.
+    pub max_pointing_error_deg: f64,
+    /// Time by the arms' clock, µs: virtual on a simulated rig.
+    pub duration_us: u64,
+    /// Events that never arrived.
+    pub events_lost: u32,
+    /// Requests that had to be repeated.
+    pub requests_repeated: u32,
+}
+
+/// Why a session ended before its last pose.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The arms cannot be used.
+    #[error("pose {index}: {source}")]
+    Arms {
+        /// The pose that was under way.
+        index: usize,
+        /// What happened.
+        source: HomeError,
+    },
+    /// A pose beyond the limits.
+    #[error("pose {index} is beyond the arms' limits: {reason}; take it out of the plan")]
+    OutOfReach {
+        /// Which pose.
+        index: usize,
+        /// Which limit.
+        reason: String,
+    },
+    /// Whoever takes the shots has failed, or wants no more.
+    #[error("pose {index}: {reason}")]
+    Taker {
+        /// The pose that was taken.
+        index: usize,
+        /// In its own words.
+        reason: String,
+    },
+}
+
+/// Homes, then moves both arms to every pose, triggers, and hands each outcome to `on_shot` before
+/// the arms move on. Arms that fail are brought back; a pose is tried `max_retakes` times more.
+///
+/// # Errors
+/// A pose out of reach, arms that cannot be brought back, or an error of `on_shot`. The arms are
+/// stopped then.
+pub fn run_session(
+    arms: &mut Arms,
+    poses: &[Pose],
+    on_shot: &mut dyn FnMut(ShotOutcome) -> Result<(), SessionError>,
+) -> Result<SessionSummary, SessionError> {
+    let began_us = arms.now_us();
+    let mut summary = SessionSummary::default();
+    let result = take_all(arms, poses, on_shot, &mut summary);
+    if result.is_err() {
+        // The error that is reported is the first one; this is only for safety's sake.
+        let _ = arms.stop();
+    }
+    summary.duration_us = arms.now_us() - began_us;
+    (summary.events_lost, summary.requests_repeated) = arms.losses();
+    result.map(|()| summary)
+}
+
+fn take_all(
+    arms: &mut Arms,
+    poses: &[Pose],
+    on_shot: &mut dyn FnMut(ShotOutcome) -> Result<(), SessionError>,
+    summary: &mut SessionSummary,
+) -> Result<(), SessionError> {
+    arms.home()
+        .map_err(|source| SessionError::Arms { index: 0, source })?;
+    for (index, pose) in poses.iter().enumerate() {
+        let outcome = take(arms, index, pose, summary)?;
+        match &outcome {
+            ShotOutcome::Kept(shot) => {
+                summary.kept += 1;
+                summary.max_pointing_error_deg =
+                    summary.max_pointing_error_deg.max(shot.pointing_error_deg);
+            }
+            ShotOutcome::Refused { .. } => summary.refused += 1,
+        }
+        on_shot(outcome)?;
+    }
+    Ok(())
+}
+
+/// One pose, with its retakes.
+fn take(
+    arms: &mut Arms,
+    index: usize,
+    pose: &Pose,
+    summary: &mut SessionSummary,
+) -> Result<ShotOutcome, SessionError> {
+    let mut reason = String::new();
+    for retakes in 0..=arms.options.max_retakes {
+        summary.retakes += u32::from(retakes > 0);
+        let targets = arms
+            .targets_udeg(pose)
+            .ok_or_else(|| SessionError::OutOfReach {
+                index,
+                reason: "no turn of an azimuth lies within the soft limits".into(),
+            })?;
+        let tried = match arms.shoot(targets) {
+            Ok(tried) => tried,
+            Err(error) => sort_error(index, error)?,
+        };
+        match tried {
+            Try::Latched(latches) => {
+                let shot = judge(index, retakes, targets, &latches);
+                if shot.pointing_error_deg <= POINTING_LIMIT_DEG {
+                    return Ok(ShotOutcome::Kept(shot));
+                }
+                reason = format!("pointing error {:.4}°", shot.pointing_error_deg);
+            }
+            Try::Again(why) => reason = why,
+            Try::Broken(why) => {
+                reason = why;
+                summary.recoveries += 1;
+                arms.recover()
+                    .map_err(|source| SessionError::Arms { index, source })?;
+            }
+        }
+    }
+    Ok(ShotOutcome::Refused { index, reason })
+}
+
+/// Which errors of the link a session can get over.
+fn sort_error(index: usize, error: LinkError) -> Result<Try, SessionError> {
+    match &error {
+        LinkError::Refused { refusal, .. } => match refusal {
+            Refusal::TargetBeyondLimit(_) => Err(SessionError::OutOfReach {
+                index,
+                reason: error.to_string(),
+            }),
+            Refusal::OutsideWindow(..) => Ok(Try::Again(error.to_string())),
+            Refusal::NoSession
+            | Refusal::NotHomed
+            | Refusal::NoSuchPulse
+            | Refusal::StartBeyondLimit(_)
+            | Refusal::State(State::Fault(_) | State::EStop | State::Unhomed) => {
+                Ok(Try::Broken(error.to_string()))
+            }
+            _ => Err(SessionError::Arms {
+                index,
+                source: error.into(),
+            }),
+        },
+        LinkError::NoAnswer { .. } => Ok(Try::Broken(error.to_string())),
+        _ => Err(SessionError::Arms {
+            index,
+            source: error.into(),
+        }),
+    }
+}
+
+fn judge(index: usize, retakes: u32, targets: [[i32; 2]; 2], latches: &[[[i32; 2]; 2]]) -> Shot {
+    let mut worst_udeg = 0;
+    for latch in latches {
+        for (target, encoder) in targets.as_flattened().iter().zip(latch.as_flattened()) {
+            worst_udeg = worst_udeg.max(target.abs_diff(*encoder));
+        }
+    }
+    let last = latches.last().copied().unwrap_or(targets);
+    let direction = |[theta, phi]: [i32; 2]| {
+        Direction::from_deg(f64::from(theta) * 1e-6, f64::from(phi) * 1e-6)
+    };
+    Shot {
+        index,
+        encoder: Pose {
+            light: direction(last[0]),
+            view: direction(last[1]),
+        },
+        pointing_error_deg: f64::from(worst_udeg) * 1e-6,
+        retakes,
+    }
+}

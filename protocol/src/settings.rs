@@ -1,0 +1,304 @@
+//! The keys of a controller's settings: number, unit, range and default.
+//!
+//! The defaults describe this axis: a 1.8° stepper at 8 microsteps on a 90:1 worm (1600 · 90 =
+//! 144,000 steps a turn, 0.0025° a step) with an 18-bit absolute ring encoder on the output shaft
+//! (0.00137° a count). 15°/s is 225 rpm of the motor, and 30°/s² on an arm of 10 kg·m² needs 5.2 N·m
+//! at the shaft, 0.12 N·m at the motor through a worm of 50 % efficiency: a tenth of what a common
+//! 1.2 N·m NEMA 23 motor holds, so that the arm and not the motor limits the ramp.
+
+use serde::{Deserialize, Serialize};
+
+/// Number of keys.
+pub const N_SETTINGS: usize = 21;
+
+/// One of the two axes of an arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Axis {
+    /// Elevation, from the sample's normal.
+    Theta,
+    /// Azimuth, anticlockwise from the sample's x axis.
+    Phi,
+}
+
+impl Axis {
+    /// Both, in the order of every pair on the wire.
+    pub const BOTH: [Axis; 2] = [Axis::Theta, Axis::Phi];
+
+    /// Its place in every pair on the wire.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// A key. Its number is on the wire and in flash and never changes its meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Key {
+    /// Motor steps a turn of the shaft.
+    StepsPerTurn = 0,
+    /// Encoder counts a turn of the shaft.
+    EncoderCountsPerTurn = 1,
+    /// Encoder count at 0°.
+    EncoderZero = 2,
+    /// Lowest target, µdeg.
+    SoftMin = 3,
+    /// Highest target, µdeg.
+    SoftMax = 4,
+    /// Angle at which the home switch closes, coming from above, µdeg.
+    HomeAngle = 5,
+    /// How far switch and encoder may disagree, µdeg. Below half a turn, so that the switch only
+    /// has to tell the turn.
+    HomeTolerance = 6,
+    /// Highest speed, µdeg/s.
+    MaxSpeed = 7,
+    /// Acceleration and deceleration, µdeg/s².
+    Acceleration = 8,
+    /// Speed of homing's first search, µdeg/s.
+    HomeFastSpeed = 9,
+    /// Speed of homing's last approach, µdeg/s.
+    HomeSlowSpeed = 10,
+    /// How far homing backs off the switch, µdeg.
+    HomeBackoff = 11,
+    /// Every target is approached from below, over at least this way, µdeg.
+    BacklashTakeup = 12,
+    /// Largest error at which a target counts as reached, µdeg.
+    Deadband = 13,
+    /// How long the encoder must stay within the deadband, µs.
+    SettleWindow = 14,
+    /// How long ringing may last before a correction is made, µs.
+    SettlePatience = 15,
+    /// Corrections allowed for one target.
+    MaxCorrections = 16,
+    /// Largest difference of steps and encoder while moving, µdeg.
+    FollowingLimit = 17,
+    /// Largest error at which a trigger pulse is given, µdeg.
+    TriggerWindow = 18,
+    /// The host must be heard this often while moving or armed, µs. Of the node: both axes share it.
+    Lease = 19,
+    /// Time between telemetry while moving, µs; 0 for none. Of the node: both axes share it.
+    Telemetry = 20,
+}
+
+/// What a key means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Meaning {
+    /// The key.
+    pub key: Key,
+    /// Its name for people.
+    pub name: &'static str,
+    /// Its unit for people.
+    pub unit: &'static str,
+    /// Lowest value.
+    pub min: i32,
+    /// Highest value.
+    pub max: i32,
+    /// Values of a new board, θ and φ.
+    pub default: [i32; 2],
+}
+
+const DEG: i32 = 1_000_000;
+
+/// Every key, in the order of its number.
+pub const MEANINGS: [Meaning; N_SETTINGS] = [
+    m(
+        Key::StepsPerTurn,
+        "steps_per_turn",
+        "steps",
+        (200, 10_000_000),
+        [144_000; 2],
+    ),
+    m(
+        Key::EncoderCountsPerTurn,
+        "encoder_counts_per_turn",
+        "counts",
+        (1024, 1 << 24),
+        [1 << 18; 2],
+    ),
+    m(
+        Key::EncoderZero,
+        "encoder_zero",
+        "counts",
+        (0, 1 << 24),
+        [0; 2],
+    ),
+    m(
+        Key::SoftMin,
+        "soft_min",
+        "µdeg",
+        (-720 * DEG, 720 * DEG),
+        [-2 * DEG, -185 * DEG],
+    ),
+    m(
+        Key::SoftMax,
+        "soft_max",
+        "µdeg",
+        (-720 * DEG, 720 * DEG),
+        [90 * DEG, 545 * DEG],
+    ),
+    m(
+        Key::HomeAngle,
+        "home_angle",
+        "µdeg",
+        (-720 * DEG, 720 * DEG),
+        [-5 * DEG, -190 * DEG],
+    ),
+    m(
+        Key::HomeTolerance,
+        "home_tolerance",
+        "µdeg",
+        (1000, 170 * DEG),
+        [DEG; 2],
+    ),
+    m(
+        Key::MaxSpeed,
+        "max_speed",
+        "µdeg/s",
+        (10_000, 180 * DEG),
+        [15 * DEG; 2],
+    ),
+    m(
+        Key::Acceleration,
+        "acceleration",
+        "µdeg/s²",
+        (100_000, 1000 * DEG),
+        [30 * DEG; 2],
+    ),
+    m(
+        Key::HomeFastSpeed,
+        "home_fast_speed",
+        "µdeg/s",
+        (10_000, 90 * DEG),
+        [10 * DEG; 2],
+    ),
+    m(
+        Key::HomeSlowSpeed,
+        "home_slow_speed",
+        "µdeg/s",
+        (10_000, 10 * DEG),
+        [500_000; 2],
+    ),
+    m(
+        Key::HomeBackoff,
+        "home_backoff",
+        "µdeg",
+        (10_000, 10 * DEG),
+        [DEG; 2],
+    ),
+    m(
+        Key::BacklashTakeup,
+        "backlash_takeup",
+        "µdeg",
+        (0, 5 * DEG),
+        [100_000; 2],
+    ),
+    m(Key::Deadband, "deadband", "µdeg", (500, 30_000), [6000; 2]),
+    m(
+        Key::SettleWindow,
+        "settle_window",
+        "µs",
+        (4000, 10_000_000),
+        [120_000; 2],
+    ),
+    m(
+        Key::SettlePatience,
+        "settle_patience",
+        "µs",
+        (20_000, 10_000_000),
+        [160_000; 2],
+    ),
+    m(Key::MaxCorrections, "max_corrections", "", (0, 50), [6; 2]),
+    m(
+        Key::FollowingLimit,
+        "following_limit",
+        "µdeg",
+        (10_000, 10 * DEG),
+        [400_000; 2],
+    ),
+    m(
+        Key::TriggerWindow,
+        "trigger_window",
+        "µdeg",
+        (1000, 30_000),
+        [30_000; 2],
+    ),
+    m(
+        Key::Lease,
+        "lease",
+        "µs",
+        (100_000, 60_000_000),
+        [2_000_000; 2],
+    ),
+    m(
+        Key::Telemetry,
+        "telemetry",
+        "µs",
+        (0, 60_000_000),
+        [500_000; 2],
+    ),
+];
+
+const fn m(
+    key: Key,
+    name: &'static str,
+    unit: &'static str,
+    range: (i32, i32),
+    default: [i32; 2],
+) -> Meaning {
+    Meaning {
+        key,
+        name,
+        unit,
+        min: range.0,
+        max: range.1,
+        default,
+    }
+}
+
+impl Key {
+    /// The key of a number, if there is one.
+    pub fn from_number(number: u8) -> Option<Self> {
+        MEANINGS.get(number as usize).map(|meaning| meaning.key)
+    }
+
+    /// Its number on the wire.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// Name, unit, range and defaults.
+    pub fn meaning(self) -> &'static Meaning {
+        &MEANINGS[self as usize]
+    }
+
+    /// Whether both axes of a node share one value.
+    pub fn is_of_the_node(self) -> bool {
+        matches!(self, Key::Lease | Key::Telemetry)
+    }
+
+    /// Its value on a new board.
+    pub fn default_of(self, axis: Axis) -> i32 {
+        self.meaning().default[axis.index()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_is_in_the_order_of_the_numbers() {
+        for (i, meaning) in MEANINGS.iter().enumerate() {
+            assert_eq!(meaning.key as usize, i);
+            assert_eq!(Key::from_number(i as u8), Some(meaning.key));
+            for value in meaning.default {
+                assert!(
+                    (meaning.min..=meaning.max).contains(&value),
+                    "{}",
+                    meaning.name
+                );
+            }
+        }
+        assert_eq!(Key::from_number(N_SETTINGS as u8), None);
+    }
+}

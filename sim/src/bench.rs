@@ -1,0 +1,125 @@
+//! Two axes behind the firmware's hardware trait: everything that one controller is wired to.
+
+use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::settings::STORED_LEN;
+use gonia_protocol::settings::{Axis, Key};
+
+use crate::plant::{AxisPlant, PlantConfig};
+
+/// Pins, encoders and memory of one simulated arm.
+#[derive(Debug)]
+pub struct Bench {
+    axes: [AxisPlant; 2],
+    now_us: u64,
+    trigger: bool,
+    rising_edges: u32,
+    holds_interlock_open: bool,
+    interlock_closed: bool,
+    flash: Option<[u8; STORED_LEN]>,
+}
+
+impl Bench {
+    /// An arm of two axes, θ and φ.
+    pub fn new(configs: [PlantConfig; 2], seed: u64) -> Self {
+        let [theta, phi] = configs;
+        Self {
+            axes: [
+                AxisPlant::new(theta, seed.wrapping_mul(2)),
+                AxisPlant::new(phi, seed.wrapping_mul(2).wrapping_add(1)),
+            ],
+            now_us: 0,
+            trigger: false,
+            rising_edges: 0,
+            holds_interlock_open: false,
+            interlock_closed: true,
+            flash: None,
+        }
+    }
+
+    /// An arm that the default settings fit, standing somewhere in its travel.
+    pub fn default_arm(seed: u64) -> Self {
+        let axis = |axis: Axis, start_udeg| {
+            PlantConfig::worm_axis(f64::from(Key::HomeAngle.default_of(axis)), start_udeg)
+        };
+        Self::new([axis(Axis::Theta, 21.3e6), axis(Axis::Phi, -12.8e6)], seed)
+    }
+
+    /// The time at which the firmware looks at its pins.
+    pub fn set_now(&mut self, now_us: u64) {
+        self.now_us = now_us;
+    }
+
+    /// One of the axes.
+    pub fn axis(&mut self, axis: Axis) -> &mut AxisPlant {
+        &mut self.axes[axis.index()]
+    }
+
+    /// The true angles of θ and φ, degrees.
+    pub fn true_deg(&self, now_us: u64) -> [f64; 2] {
+        [0, 1].map(|i| self.axes[i].true_udeg(now_us) * 1e-6)
+    }
+
+    /// Rising edges of the trigger output since the last call.
+    pub fn take_rising_edges(&mut self) -> u32 {
+        core::mem::take(&mut self.rising_edges)
+    }
+
+    /// Whether this controller holds the shared interlock open.
+    pub fn holds_interlock_open(&self) -> bool {
+        self.holds_interlock_open
+    }
+
+    /// The interlock's chain closes or opens.
+    pub fn set_interlock_closed(&mut self, closed: bool) {
+        self.interlock_closed = closed;
+    }
+
+    /// What the board's memory holds.
+    pub fn flash(&self) -> Option<&[u8]> {
+        self.flash.as_ref().map(|bytes| &bytes[..])
+    }
+
+    /// Outputs fall back to what they are without a controller.
+    pub fn reset_outputs(&mut self) {
+        self.trigger = false;
+        self.holds_interlock_open = false;
+    }
+}
+
+impl Hardware for Bench {
+    fn step(&mut self, axis: Axis, forward: bool, due_us: u64) {
+        self.axes[axis.index()].step(forward, due_us);
+    }
+
+    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
+        let now_us = self.now_us;
+        self.axes[axis.index()]
+            .encoder_counts(now_us)
+            .ok_or(EncoderLost)
+    }
+
+    fn home_switch_closed(&mut self, axis: Axis) -> bool {
+        let now_us = self.now_us;
+        self.axes[axis.index()].switch_closed(now_us)
+    }
+
+    fn interlock_closed(&mut self) -> bool {
+        self.interlock_closed && !self.holds_interlock_open
+    }
+
+    fn hold_interlock_open(&mut self, open: bool) {
+        self.holds_interlock_open = open;
+    }
+
+    fn set_trigger(&mut self, on: bool) {
+        if on && !self.trigger {
+            self.rising_edges += 1;
+        }
+        self.trigger = on;
+    }
+
+    fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
+        self.flash = Some(bytes.try_into().map_err(|_| NotSaved)?);
+        Ok(())
+    }
+}

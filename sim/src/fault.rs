@@ -1,0 +1,116 @@
+//! What may go wrong, as data.
+
+use gonia_protocol::settings::Axis;
+
+/// Everything that goes wrong in a session. The default is a good day.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FaultPlan {
+    /// Faults of both wires, all the time.
+    pub wire: WireFaults,
+    /// Faults at a time.
+    pub events: Vec<FaultEvent>,
+}
+
+/// What happens to bytes under way. Probabilities are per byte, and the same both ways.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WireFaults {
+    /// A random bit is flipped.
+    pub flip: f64,
+    /// The byte is lost.
+    pub drop: f64,
+    /// The byte comes twice.
+    pub repeat: f64,
+    /// This byte and all after it come later, by up to [`Self::delay_us`].
+    pub delay: f64,
+    /// The longest delay, µs.
+    pub delay_us: u64,
+}
+
+/// A fault at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultEvent {
+    /// When, µs of virtual time.
+    pub at_us: u64,
+    /// Which arm.
+    pub arm: Arm,
+    /// What.
+    pub fault: Fault,
+}
+
+/// One of the two arms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arm {
+    /// The light's.
+    Light,
+    /// The camera's.
+    Camera,
+}
+
+impl Arm {
+    /// Both, in the order of every pair.
+    pub const BOTH: [Arm; 2] = [Arm::Light, Arm::Camera];
+}
+
+/// What can happen to an arm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// The motor falls back by magnetic cycles.
+    LoseCycles {
+        /// Of which axis.
+        axis: Axis,
+        /// How many; negative ones push it on.
+        cycles: i32,
+    },
+    /// The motor stands still whatever steps it gets.
+    Stall {
+        /// Of which axis.
+        axis: Axis,
+        /// How long, µs.
+        for_us: u64,
+    },
+    /// The shaft slips against the gear.
+    Slip {
+        /// Of which axis.
+        axis: Axis,
+        /// By how much.
+        udeg: f64,
+    },
+    /// The encoder does not answer.
+    EncoderLost {
+        /// Of which axis.
+        axis: Axis,
+        /// How long, µs.
+        for_us: u64,
+    },
+    /// The encoder is off from now on.
+    EncoderJump {
+        /// Of which axis.
+        axis: Axis,
+        /// By how much.
+        udeg: f64,
+    },
+    /// The home switch says the same whatever happens; `None` lets it go again.
+    SwitchStuck {
+        /// Of which axis.
+        axis: Axis,
+        /// What it says.
+        reading: Option<bool>,
+    },
+    /// The interlock of both arms opens.
+    InterlockOpen {
+        /// How long, µs.
+        for_us: u64,
+    },
+    /// The cable is out, both ways.
+    Unplugged {
+        /// How long, µs.
+        for_us: u64,
+    },
+    /// The controller restarts after a sag of its supply.
+    BrownOut,
+    /// The other arm does not see the next pulses.
+    TriggerLost {
+        /// How many pulses.
+        pulses: u32,
+    },
+}

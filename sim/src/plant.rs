@@ -1,0 +1,354 @@
+//! One axis as a machine: stepper, worm gear, shaft, ring encoder, home switch.
+//!
+//! The motor is moved by events (a step at a time); everything else is a function of time, worked
+//! out when somebody looks. So an axis at rest costs nothing.
+//!
+//! Effects and where they sit:
+//! step → *lost magnetic cycles* → motor → *gear error, backlash* → shaft → *ringing* → true angle
+//! → *eccentricity, noise, counts* → encoder.
+
+use core::f64::consts::TAU;
+
+use rand_core::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// What an axis is made of. Angles of the shaft in µdeg.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantConfig {
+    /// Driver steps a turn of the shaft.
+    pub steps_per_turn: u32,
+    /// Driver steps of one magnetic cycle: four full steps. Steps are only ever lost by whole cycles.
+    pub steps_per_cycle: u32,
+    /// Above this rate the motor has no torque left, steps/s.
+    pub pull_out_steps_s: f64,
+    /// The largest change of rate from one step to the next that the rotor follows, steps/s.
+    pub pull_in_steps_s: f64,
+    /// Play of the gear.
+    pub backlash_udeg: f64,
+    /// Amplitude of the gear's error, periodic in the worm's turn.
+    pub gear_error_udeg: f64,
+    /// The worm's turn at the shaft.
+    pub worm_turn_udeg: f64,
+    /// Amplitude of the motor's deviation between full steps, periodic in the magnetic cycle.
+    pub microstep_error_udeg: f64,
+    /// Amplitude of the arm's swing when a run ends.
+    pub ring_udeg: f64,
+    /// Frequency of the swing, Hz.
+    pub ring_hz: f64,
+    /// Time in which the swing falls to 1/e, s.
+    pub ring_decay_s: f64,
+    /// Encoder counts a turn.
+    pub encoder_counts: u32,
+    /// Standard deviation of a reading.
+    pub encoder_noise_udeg: f64,
+    /// Amplitude of the encoder's error, periodic in the turn: the ring's eccentricity.
+    pub eccentricity_udeg: f64,
+    /// Where that error is zero.
+    pub eccentricity_phase_udeg: f64,
+    /// The switch is closed at and below this angle.
+    pub home_udeg: f64,
+    /// How long the switch chatters after it changes, µs.
+    pub bounce_us: u64,
+    /// Where the shaft stands at first.
+    pub start_udeg: f64,
+}
+
+impl PlantConfig {
+    /// The axis that the default settings are made for (see `gonia_protocol::settings`): 1.8°
+    /// motor, 8 microsteps, 90:1 worm, 18-bit ring encoder.
+    ///
+    /// Play 0.015° and gear error ±0.003° are those of a good worm stage (54 and 11 arc seconds).
+    /// The swing follows from the arm: 30°/s² at 10 Hz natural frequency deflect it by
+    /// 30/(2π·10)² = 0.0076°, and 8 % damping gives 0.2 s of decay. Pull-out at 600 rpm of the
+    /// motor. Noise of half a count, and 0.004° of eccentricity left after calibration, which a
+    /// 70 mm ring has at 2.5 µm off centre.
+    pub fn worm_axis(home_udeg: f64, start_udeg: f64) -> Self {
+        Self {
+            steps_per_turn: 144_000,
+            steps_per_cycle: 32,
+            pull_out_steps_s: 16_000.0,
+            pull_in_steps_s: 1_200.0,
+            backlash_udeg: 15_000.0,
+            gear_error_udeg: 3_000.0,
+            worm_turn_udeg: 4e6,
+            microstep_error_udeg: 400.0,
+            ring_udeg: 7_600.0,
+            ring_hz: 10.0,
+            ring_decay_s: 0.2,
+            encoder_counts: 1 << 18,
+            encoder_noise_udeg: 700.0,
+            eccentricity_udeg: 4_000.0,
+            eccentricity_phase_udeg: 0.0,
+            home_udeg,
+            bounce_us: 3_000,
+            start_udeg,
+        }
+    }
+}
+
+/// One axis in motion.
+#[derive(Debug)]
+pub struct AxisPlant {
+    config: PlantConfig,
+    rng: Xoshiro256PlusPlus,
+    step_udeg: f64,
+    motor_udeg: f64,
+    output_udeg: f64,
+    /// Shaft against gear: what a slip or a knock has left.
+    slipped_udeg: f64,
+    /// Steps/s of the last step, signed.
+    rate: f64,
+    last_step_us: u64,
+    switch_closed: bool,
+    switch_changed_us: u64,
+    stalled_until_us: u64,
+    encoder_lost_until_us: u64,
+    encoder_offset_udeg: f64,
+    switch_stuck: Option<bool>,
+    lost_cycles: u32,
+}
+
+impl AxisPlant {
+    /// An axis at rest. The same seed gives the same noise.
+    pub fn new(config: PlantConfig, seed: u64) -> Self {
+        Self {
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+            step_udeg: 360e6 / f64::from(config.steps_per_turn.max(1)),
+            motor_udeg: config.start_udeg,
+            output_udeg: config.start_udeg,
+            slipped_udeg: 0.0,
+            rate: 0.0,
+            last_step_us: 0,
+            switch_closed: config.start_udeg <= config.home_udeg,
+            switch_changed_us: 0,
+            stalled_until_us: 0,
+            encoder_lost_until_us: 0,
+            encoder_offset_udeg: 0.0,
+            switch_stuck: None,
+            lost_cycles: 0,
+            config,
+        }
+    }
+
+    /// The driver gets a step.
+    pub fn step(&mut self, forward: bool, at_us: u64) {
+        let direction = if forward { 1.0 } else { -1.0 };
+        let interval_us = (at_us.saturating_sub(self.last_step_us)).max(1);
+        self.last_step_us = at_us;
+        if at_us < self.stalled_until_us {
+            return;
+        }
+        let rate = direction * 1e6 / interval_us as f64;
+        let jump = libm::fabs(rate - self.rate);
+        self.rate = rate;
+        if jump > self.config.pull_in_steps_s && libm::fabs(rate) > self.config.pull_in_steps_s
+            || libm::fabs(rate) > self.config.pull_out_steps_s
+        {
+            self.lose_cycles(direction as i32);
+        }
+        self.motor_udeg += direction * self.step_udeg;
+        self.pull_output();
+    }
+
+    /// The true angle of the shaft, µdeg.
+    pub fn true_udeg(&self, now_us: u64) -> f64 {
+        let config = &self.config;
+        let cycle_udeg = self.step_udeg * f64::from(config.steps_per_cycle);
+        let motor = self.motor_udeg;
+        let gear = config.gear_error_udeg * libm::sin(TAU * (motor / config.worm_turn_udeg))
+            + config.microstep_error_udeg * libm::sin(TAU * (motor / cycle_udeg));
+        self.output_udeg + self.slipped_udeg + gear + self.swing_udeg(now_us)
+    }
+
+    /// What the encoder says, in counts of one turn; `None` when it does not answer.
+    pub fn encoder_counts(&mut self, now_us: u64) -> Option<u32> {
+        if now_us < self.encoder_lost_until_us {
+            return None;
+        }
+        let shaft = self.true_udeg(now_us);
+        let config = &self.config;
+        let phase = TAU * ((shaft - config.eccentricity_phase_udeg) / 360e6);
+        let seen = shaft
+            + config.eccentricity_udeg * libm::sin(phase)
+            + config.encoder_noise_udeg * gaussian(&mut self.rng)
+            + self.encoder_offset_udeg;
+        let counts = libm::floor(seen * f64::from(config.encoder_counts) / 360e6 + 0.5);
+        Some((counts as i64).rem_euclid(i64::from(config.encoder_counts)) as u32)
+    }
+
+    /// What the home switch says.
+    pub fn switch_closed(&mut self, now_us: u64) -> bool {
+        if let Some(stuck) = self.switch_stuck {
+            return stuck;
+        }
+        let closed = self.output_udeg + self.slipped_udeg <= self.config.home_udeg;
+        if closed != self.switch_closed {
+            self.switch_closed = closed;
+            self.switch_changed_us = now_us;
+        }
+        if now_us < self.switch_changed_us + self.config.bounce_us {
+            self.rng.next_u32() & 1 == 0
+        } else {
+            closed
+        }
+    }
+
+    /// The motor falls back by magnetic cycles: positive ones cost way upwards.
+    pub fn lose_cycles(&mut self, cycles: i32) {
+        let cycle_udeg = self.step_udeg * f64::from(self.config.steps_per_cycle);
+        self.lost_cycles += cycles.unsigned_abs();
+        self.motor_udeg -= f64::from(cycles) * cycle_udeg;
+        self.pull_output();
+    }
+
+    /// Cycles lost so far.
+    pub fn lost_cycles(&self) -> u32 {
+        self.lost_cycles
+    }
+
+    /// The motor turns no more until then.
+    pub fn stall_until(&mut self, until_us: u64) {
+        self.stalled_until_us = until_us;
+    }
+
+    /// The encoder does not answer until then.
+    pub fn lose_encoder_until(&mut self, until_us: u64) {
+        self.encoder_lost_until_us = until_us;
+    }
+
+    /// The encoder is off by so much from now on.
+    pub fn shift_encoder(&mut self, udeg: f64) {
+        self.encoder_offset_udeg += udeg;
+    }
+
+    /// The shaft slips against the gear, or is knocked.
+    pub fn slip(&mut self, udeg: f64) {
+        self.slipped_udeg += udeg;
+    }
+
+    /// The switch sticks, or is let go.
+    pub fn stick_switch(&mut self, reading: Option<bool>) {
+        self.switch_stuck = reading;
+    }
+
+    /// A worm cannot be driven back: the shaft moves only when a flank of the gear pushes it.
+    fn pull_output(&mut self) {
+        let half = 0.5 * self.config.backlash_udeg;
+        self.output_udeg = self
+            .output_udeg
+            .clamp(self.motor_udeg - half, self.motor_udeg + half);
+    }
+
+    fn swing_udeg(&self, now_us: u64) -> f64 {
+        let since_s = now_us.saturating_sub(self.last_step_us) as f64 * 1e-6;
+        // After 12 decay times it is below a hundred-thousandth: spare the functions.
+        if self.last_step_us == 0 || since_s > 12.0 * self.config.ring_decay_s {
+            return 0.0;
+        }
+        let amplitude = self.config.ring_udeg * libm::exp(-since_s / self.config.ring_decay_s);
+        let sign = if self.rate < 0.0 { -1.0 } else { 1.0 };
+        sign * amplitude * libm::sin(TAU * self.config.ring_hz * since_s)
+    }
+}
+
+/// A number of mean 0 and variance 1, from four uniform ones of 16 bits: bell-shaped to ±3.4, which
+/// is what an encoder's noise is.
+fn gaussian(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let bits = rng.next_u64();
+    let sum = (0..4)
+        .map(|i| (bits >> (16 * i)) as u16)
+        .map(f64::from)
+        .sum::<f64>();
+    // Each has variance (2³²−1)/12.
+    (sum - 2.0 * 65_535.0) * 2.642_936e-5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quiet() -> PlantConfig {
+        PlantConfig {
+            gear_error_udeg: 0.0,
+            microstep_error_udeg: 0.0,
+            ring_udeg: 0.0,
+            encoder_noise_udeg: 0.0,
+            eccentricity_udeg: 0.0,
+            ..PlantConfig::worm_axis(-5e6, 10e6)
+        }
+    }
+
+    /// Steps at a constant, slow rate.
+    fn walk(plant: &mut AxisPlant, steps: i32, from_us: u64) -> u64 {
+        (0..steps.unsigned_abs()).fold(from_us, |t, _| {
+            plant.step(steps > 0, t + 2000);
+            t + 2000
+        })
+    }
+
+    #[test]
+    fn a_turn_back_first_takes_up_the_play() {
+        let mut plant = AxisPlant::new(quiet(), 1);
+        let t = walk(&mut plant, 400, 0);
+        let up = plant.true_udeg(t);
+        let t = walk(&mut plant, -6, t);
+        assert_eq!(plant.true_udeg(t), up);
+        let t = walk(&mut plant, -400, t);
+        assert_eq!(plant.true_udeg(t), up - 400.0 * 2500.0);
+    }
+
+    #[test]
+    fn a_start_that_is_too_fast_loses_whole_cycles() {
+        let mut plant = AxisPlant::new(quiet(), 1);
+        for i in 0..10 {
+            plant.step(true, 1_000_000 + i * 200);
+        }
+        assert_eq!(plant.lost_cycles(), 1);
+        let mut gentle = AxisPlant::new(quiet(), 1);
+        walk(&mut gentle, 10, 1_000_000);
+        assert_eq!(gentle.lost_cycles(), 0);
+    }
+
+    #[test]
+    fn noise_is_the_seeds_and_of_the_stated_size() {
+        let read = |seed| {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            (0..20_000).map(|_| gaussian(&mut rng)).collect::<Vec<_>>()
+        };
+        assert_eq!(read(3), read(3));
+        let values = read(3);
+        let mean = values.iter().sum::<f64>() / 20_000.0;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 20_000.0;
+        assert!(
+            mean.abs() < 0.03 && (variance - 1.0).abs() < 0.03,
+            "{mean} {variance}"
+        );
+    }
+
+    #[test]
+    fn eccentricity_parts_the_encoder_from_the_true_angle() {
+        let config = PlantConfig {
+            eccentricity_udeg: 50_000.0,
+            start_udeg: 90e6,
+            ..quiet()
+        };
+        let mut plant = AxisPlant::new(config, 1);
+        let seen = f64::from(plant.encoder_counts(0).unwrap()) * 360e6 / f64::from(1 << 18);
+        assert!((seen - plant.true_udeg(0) - 50_000.0).abs() < 700.0);
+    }
+
+    #[test]
+    fn the_switch_chatters_and_then_holds() {
+        let mut plant = AxisPlant::new(
+            PlantConfig {
+                start_udeg: -5e6 + 1.0,
+                ..quiet()
+            },
+            1,
+        );
+        assert!(!plant.switch_closed(10_000));
+        let t = walk(&mut plant, -100, 10_000);
+        let readings: Vec<bool> = (0..40).map(|i| plant.switch_closed(t + i * 100)).collect();
+        assert!(readings.contains(&false) && readings[30..].iter().all(|&closed| closed));
+    }
+}

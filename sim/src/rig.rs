@@ -1,0 +1,127 @@
+//! Two real controllers on their plants, in virtual time.
+//!
+//! Time passes only while a port waits for bytes; both arms run on together whichever port waits.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use gonia_brdf::direction::{Direction, Pose};
+
+use crate::bench::Bench;
+pub use crate::fault::Arm;
+use crate::fault::FaultPlan;
+use crate::world::World;
+
+/// A trigger pulse, and where the shafts truly were at its rising edge. Only the simulated camera
+/// may look at this; the host sees encoders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriggerRecord {
+    /// Counts pulses of both arms, from 0.
+    pub sequence: u32,
+    /// Virtual time, µs.
+    pub time_us: u64,
+    /// The arm that gave it.
+    pub source: Arm,
+    /// True θ and φ of the light arm, degrees.
+    pub light_deg: [f64; 2],
+    /// True θ and φ of the camera arm, degrees.
+    pub camera_deg: [f64; 2],
+}
+
+impl TriggerRecord {
+    /// The true pose.
+    pub fn pose(&self) -> Pose {
+        let direction = |[theta, phi]: [f64; 2]| Direction::from_deg(theta, phi);
+        Pose {
+            light: direction(self.light_deg),
+            view: direction(self.camera_deg),
+        }
+    }
+}
+
+/// The simulated rig. Clones are the same rig.
+#[derive(Clone, Debug)]
+pub struct SimRig {
+    world: Arc<Mutex<World>>,
+}
+
+impl SimRig {
+    /// A rig of default arms. The same seed and plan give the same bytes.
+    pub fn new(seed: u64, faults: FaultPlan) -> Self {
+        let light = Bench::default_arm(seed.wrapping_mul(4).wrapping_add(1));
+        let camera = Bench::default_arm(seed.wrapping_mul(4).wrapping_add(2));
+        Self::with_arms(seed, faults, [light, camera])
+    }
+
+    /// A rig of other arms: light, camera.
+    pub fn with_arms(seed: u64, faults: FaultPlan, arms: [Bench; 2]) -> Self {
+        Self {
+            world: Arc::new(Mutex::new(World::new(seed, faults, arms))),
+        }
+    }
+
+    /// The host's end of an arm's wire.
+    pub fn port(&self, arm: Arm) -> SimPort {
+        SimPort {
+            world: Arc::clone(&self.world),
+            arm,
+        }
+    }
+
+    /// Virtual time, µs.
+    pub fn now_us(&self) -> u64 {
+        lock(&self.world).now_us()
+    }
+
+    /// Where the arms truly were at the last trigger pulse.
+    pub fn true_pose_at_last_trigger(&self) -> Option<Pose> {
+        lock(&self.world).triggers().last().map(TriggerRecord::pose)
+    }
+
+    /// Every trigger pulse so far.
+    pub fn triggers(&self) -> Vec<TriggerRecord> {
+        lock(&self.world).triggers().to_vec()
+    }
+
+    /// The true angles of an arm now, degrees.
+    pub fn true_deg(&self, arm: Arm) -> [f64; 2] {
+        let mut world = lock(&self.world);
+        let now_us = world.now_us();
+        world.bench(arm).true_deg(now_us)
+    }
+
+    /// A hash of every byte that the controllers have sent: equal for equal runs.
+    pub fn trace(&self) -> u64 {
+        lock(&self.world).trace()
+    }
+}
+
+/// The host's end of one wire.
+#[derive(Debug)]
+pub struct SimPort {
+    world: Arc<Mutex<World>>,
+    arm: Arm,
+}
+
+impl SimPort {
+    /// Sends bytes to the controller.
+    pub fn send(&self, bytes: &[u8]) {
+        lock(&self.world).send(self.arm, bytes);
+    }
+
+    /// Lets virtual time pass until bytes arrive, or for `timeout_us`; appends what arrived.
+    pub fn receive(&self, out: &mut Vec<u8>, timeout_us: u64) {
+        let mut world = lock(&self.world);
+        let deadline = world.now_us() + timeout_us;
+        world.receive(self.arm, out, deadline);
+    }
+
+    /// Virtual time, µs.
+    pub fn now_us(&self) -> u64 {
+        lock(&self.world).now_us()
+    }
+}
+
+/// A thread that panicked elsewhere does not make the rig unusable.
+fn lock(world: &Mutex<World>) -> MutexGuard<'_, World> {
+    world.lock().unwrap_or_else(PoisonError::into_inner)
+}

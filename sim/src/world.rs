@@ -1,0 +1,221 @@
+//! Both arms and their wires in virtual time. Between two events nothing is computed: the clock
+//! jumps.
+
+use gonia_firmware::controller::Controller;
+use gonia_firmware::node::Node;
+use gonia_protocol::message::{Identity, ResetReason};
+use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+
+use crate::bench::Bench;
+use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
+use crate::rig::TriggerRecord;
+use crate::wire::Wire;
+
+#[derive(Debug)]
+struct ArmSim {
+    address: u8,
+    node: Node,
+    bench: Bench,
+    to_device: Wire,
+    to_host: Wire,
+    boot_id: u32,
+    lost_triggers: u32,
+}
+
+#[derive(Debug)]
+pub(crate) struct World {
+    now_us: u64,
+    arms: [ArmSim; 2],
+    events: Vec<FaultEvent>,
+    next_event: usize,
+    interlock_open_until_us: u64,
+    triggers: Vec<TriggerRecord>,
+    trace: u64,
+}
+
+impl World {
+    pub(crate) fn new(seed: u64, mut plan: FaultPlan, benches: [Bench; 2]) -> Self {
+        plan.events.sort_by_key(|event| event.at_us);
+        let [light, camera] = benches;
+        let arm = |address: u8, bench: Bench| {
+            let wire_seed = seed.wrapping_add(u64::from(address) << 32);
+            ArmSim {
+                address,
+                node: boot(address, 1, ResetReason::PowerOn, 0, None),
+                bench,
+                to_device: Wire::new(plan.wire, wire_seed),
+                to_host: Wire::new(plan.wire, wire_seed + 1),
+                boot_id: 1,
+                lost_triggers: 0,
+            }
+        };
+        Self {
+            now_us: 0,
+            arms: [arm(NODE_LIGHT, light), arm(NODE_CAMERA, camera)],
+            events: plan.events,
+            next_event: 0,
+            interlock_open_until_us: 0,
+            triggers: Vec::new(),
+            trace: 0xCBF2_9CE4_8422_2325,
+        }
+    }
+
+    pub(crate) fn now_us(&self) -> u64 {
+        self.now_us
+    }
+
+    pub(crate) fn triggers(&self) -> &[TriggerRecord] {
+        &self.triggers
+    }
+
+    pub(crate) fn trace(&self) -> u64 {
+        self.trace
+    }
+
+    pub(crate) fn bench(&mut self, arm: Arm) -> &mut Bench {
+        &mut self.arms[arm as usize].bench
+    }
+
+    pub(crate) fn send(&mut self, arm: Arm, bytes: &[u8]) {
+        self.arms[arm as usize].to_device.send(self.now_us, bytes);
+    }
+
+    /// Lets time pass until bytes for the host arrive from this arm, or until the deadline.
+    pub(crate) fn receive(&mut self, arm: Arm, out: &mut Vec<u8>, deadline_us: u64) {
+        loop {
+            let before = out.len();
+            while let Some(byte) = self.arms[arm as usize].to_host.take(self.now_us) {
+                out.push(byte);
+            }
+            if out.len() > before || self.now_us >= deadline_us {
+                return;
+            }
+            self.advance(deadline_us.min(self.arms[arm as usize].to_host.next_us()));
+        }
+    }
+
+    /// Goes to the next event, at most to `limit_us`.
+    fn advance(&mut self, limit_us: u64) {
+        let event_us = self
+            .events
+            .get(self.next_event)
+            .map_or(u64::MAX, |e| e.at_us);
+        let next = self
+            .arms
+            .iter()
+            .map(|arm| arm.node.wake_us().min(arm.to_device.next_us()))
+            .fold(limit_us.min(event_us), u64::min);
+        self.now_us = self.now_us.max(next);
+        if event_us <= self.now_us {
+            let event = self.events[self.next_event];
+            self.next_event += 1;
+            self.strike(event);
+        }
+        for i in 0..2 {
+            self.run_arm(i);
+        }
+    }
+
+    fn run_arm(&mut self, i: usize) {
+        let now_us = self.now_us;
+        let arm = &mut self.arms[i];
+        let wakes = arm.node.wake_us() <= now_us;
+        if !wakes && arm.to_device.next_us() > now_us {
+            return;
+        }
+        arm.bench.set_now(now_us);
+        if wakes {
+            let other_holds = self.arms[1 - i].bench.holds_interlock_open();
+            let closed = !other_holds && now_us >= self.interlock_open_until_us;
+            let arm = &mut self.arms[i];
+            arm.bench.set_interlock_closed(closed);
+            arm.node.poll(now_us, &mut arm.bench);
+        }
+        let arm = &mut self.arms[i];
+        while let Some(byte) = arm.to_device.take(now_us) {
+            arm.node.receive(byte, now_us, &mut arm.bench);
+        }
+        let edges = arm.bench.take_rising_edges();
+        self.send_frames(i);
+        for _ in 0..edges {
+            self.trigger(i);
+        }
+    }
+
+    fn send_frames(&mut self, i: usize) {
+        let arm = &mut self.arms[i];
+        while let Some(frame) = arm.node.take_frame() {
+            for &byte in &frame {
+                self.trace = (self.trace ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
+            }
+            arm.to_host.send(self.now_us, &frame);
+        }
+    }
+
+    /// A rising edge on the trigger wire: the camera exposes, the other arm latches.
+    fn trigger(&mut self, source: usize) {
+        let now_us = self.now_us;
+        let record = TriggerRecord {
+            sequence: self.triggers.len() as u32,
+            time_us: now_us,
+            source: Arm::BOTH[source],
+            light_deg: self.arms[0].bench.true_deg(now_us),
+            camera_deg: self.arms[1].bench.true_deg(now_us),
+        };
+        self.triggers.push(record);
+        let follower = &mut self.arms[1 - source];
+        if follower.lost_triggers > 0 {
+            follower.lost_triggers -= 1;
+            return;
+        }
+        follower.bench.set_now(now_us);
+        follower.node.trigger_edge(now_us, &mut follower.bench);
+        self.send_frames(1 - source);
+    }
+
+    fn strike(&mut self, event: FaultEvent) {
+        let now_us = self.now_us;
+        let i = event.arm as usize;
+        let arm = &mut self.arms[i];
+        match event.fault {
+            Fault::LoseCycles { axis, cycles } => arm.bench.axis(axis).lose_cycles(cycles),
+            Fault::Stall { axis, for_us } => arm.bench.axis(axis).stall_until(now_us + for_us),
+            Fault::Slip { axis, udeg } => arm.bench.axis(axis).slip(udeg),
+            Fault::EncoderLost { axis, for_us } => {
+                arm.bench.axis(axis).lose_encoder_until(now_us + for_us);
+            }
+            Fault::EncoderJump { axis, udeg } => arm.bench.axis(axis).shift_encoder(udeg),
+            Fault::SwitchStuck { axis, reading } => arm.bench.axis(axis).stick_switch(reading),
+            Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
+            Fault::Unplugged { for_us } => {
+                arm.to_device.unplug_until(now_us + for_us);
+                arm.to_host.unplug_until(now_us + for_us);
+            }
+            Fault::BrownOut => {
+                arm.boot_id += 1;
+                arm.bench.reset_outputs();
+                arm.to_device.clear();
+                arm.to_host.clear();
+                let (id, reset) = (arm.boot_id, ResetReason::BrownOut);
+                arm.node = boot(arm.address, id, reset, now_us, arm.bench.flash());
+            }
+            Fault::TriggerLost { pulses } => arm.lost_triggers += pulses,
+        }
+    }
+}
+
+fn boot(address: u8, boot_id: u32, reset: ResetReason, now_us: u64, flash: Option<&[u8]>) -> Node {
+    let identity = Identity {
+        protocol_min: PROTOCOL_VERSION,
+        protocol_max: PROTOCOL_VERSION,
+        schema_key: SCHEMA_KEY,
+        firmware: gonia_firmware::VERSION,
+        git: gonia_firmware::git_state(),
+        board: "sim".try_into().unwrap_or_default(),
+        config_crc: 0,
+        boot_id,
+        reset,
+        last_panic: Default::default(),
+    };
+    Node::new(address, identity, Controller::new(now_us, flash))
+}

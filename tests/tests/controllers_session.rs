@@ -1,0 +1,98 @@
+//! Whole sessions: the host's capture over the real codec, the real firmware core, the simulated
+//! plant, in virtual time.
+
+#![allow(clippy::unwrap_used)]
+
+use gonia::capture::{Arms, POINTING_LIMIT_DEG, SessionSummary, Shot, ShotOutcome, run_session};
+use gonia_brdf::direction::angle_between;
+use gonia_brdf::{Direction, Pose};
+use gonia_sim::fault::{Arm, FaultPlan, WireFaults};
+use gonia_sim::rig::SimRig;
+
+/// What a session brought, and where the arms truly were at each kept shot.
+struct Session {
+    rig: SimRig,
+    shots: Vec<(Shot, Pose)>,
+    refused: Vec<String>,
+    summary: SessionSummary,
+}
+
+fn run(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Session {
+    let rig = SimRig::new(seed, faults);
+    let port = |arm| Box::new(rig.port(arm));
+    let mut arms = Arms::connect(port(Arm::Light), port(Arm::Camera)).unwrap();
+    let (mut shots, mut refused) = (Vec::new(), Vec::new());
+    let summary = run_session(&mut arms, poses, &mut |outcome| {
+        match outcome {
+            ShotOutcome::Kept(shot) => shots.push((shot, rig.true_pose_at_last_trigger().unwrap())),
+            ShotOutcome::Refused { reason, .. } => refused.push(reason),
+        }
+        Ok(())
+    })
+    .unwrap();
+    Session {
+        rig,
+        shots,
+        refused,
+        summary,
+    }
+}
+
+/// Poses all over the hemisphere, with steps of every size and both signs.
+fn poses(n: usize) -> Vec<Pose> {
+    (0..n)
+        .map(|i| {
+            let f = i as f64;
+            Pose {
+                light: Direction::from_deg((f * 23.0) % 86.0, f * 47.0),
+                view: Direction::from_deg((f * 11.0) % 76.0, 360.0 - f * 15.0),
+            }
+        })
+        .collect()
+}
+
+/// The largest angle between commanded and true directions of light and view, degrees.
+fn true_error_deg(commanded: &Pose, truth: &Pose) -> f64 {
+    let angle = |a: Direction, b: Direction| angle_between(a.to_vec3(), b.to_vec3()).to_degrees();
+    angle(commanded.light, truth.light).max(angle(commanded.view, truth.view))
+}
+
+#[test]
+fn every_pose_of_a_good_day_is_kept_and_truly_there() {
+    let poses = poses(150);
+    let session = run(7, FaultPlan::default(), &poses);
+    assert_eq!(session.refused, Vec::<String>::new());
+    assert_eq!(session.shots.len(), poses.len());
+    for (i, (shot, truth)) in session.shots.iter().enumerate() {
+        assert_eq!(shot.index, i);
+        assert!(shot.pointing_error_deg <= 0.01, "{shot:?}");
+        let error = true_error_deg(&poses[i], truth);
+        assert!(error <= POINTING_LIMIT_DEG, "pose {i}: {error}");
+        // The host sees encoders, which are not the truth.
+        assert_ne!(shot.encoder, *truth);
+    }
+    assert_eq!(
+        (
+            session.summary.events_lost,
+            session.summary.requests_repeated
+        ),
+        (0, 0)
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
+    let faults = || FaultPlan {
+        wire: WireFaults {
+            flip: 1e-3,
+            ..WireFaults::default()
+        },
+        ..FaultPlan::default()
+    };
+    let poses = poses(10);
+    let traces: Vec<u64> = [1, 1, 2]
+        .map(|seed| run(seed, faults(), &poses).rig.trace())
+        .to_vec();
+    assert_eq!(traces[0], traces[1]);
+    assert_ne!(traces[0], traces[2]);
+}
