@@ -1,1 +1,27 @@
-//! From frames to samples.
+//! From a frame to the values at its grid points: registration by the four lines, occlusion,
+//! sampling.
+
+pub mod camera;
+pub mod homography;
+mod hough;
+mod lines;
+pub mod occlusion;
+mod profile;
+mod refine;
+pub mod register;
+#[cfg(test)]
+mod register_tests;
+pub mod sampling;
+#[cfg(test)]
+pub(crate) mod simulated;
+
+pub use camera::CameraModel;
+pub use homography::Homography;
+pub use occlusion::Mask;
+pub use register::{PoseOffset, Reason, Registrar, Registration, State};
+pub use sampling::{LeftOut, PointValue, SamplingGrid};
+
+/// Mean of the three channels: what marks and occlusions are looked for in.
+fn luminance(rgb: [f32; 3]) -> f32 {
+    (rgb[0] + rgb[1] + rgb[2]) * (1.0 / 3.0)
+}

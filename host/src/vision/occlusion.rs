@@ -1,0 +1,278 @@
+//! What hides the target: Otsu's threshold on the reference's frame, where it makes sense.
+
+use super::luminance;
+use super::register::Registration;
+use crate::dataset::{Frame, Rig};
+use gonia_brdf::Direction;
+
+/// The hidden pixels of a frame: a bitmap of the smallest rectangle that holds them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+    words: Vec<u64>,
+}
+
+impl Mask {
+    /// Whether a pixel is hidden.
+    pub fn hides(&self, column: usize, row: usize) -> bool {
+        let (x, y) = (column.wrapping_sub(self.left), row.wrapping_sub(self.top));
+        if x >= self.width || y >= self.height {
+            return false;
+        }
+        let bit = y * self.width + x;
+        self.words[bit / 64] >> (bit % 64) & 1 == 1
+    }
+
+    /// Number of hidden pixels.
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// Memory of the bitmap, bytes.
+    pub fn bytes(&self) -> usize {
+        self.words.len() * 8
+    }
+
+    /// A mask of the pixels within `margin` (in both axes) of the given ones; `None` without any.
+    fn grown(pixels: &[[u32; 2]], margin: usize, size: [usize; 2]) -> Option<Self> {
+        let low = |i: usize| pixels.iter().map(|p| p[i] as usize).min();
+        let high = |i: usize| pixels.iter().map(|p| p[i] as usize).max();
+        let (left, top) = (
+            low(0)?.saturating_sub(margin),
+            low(1)?.saturating_sub(margin),
+        );
+        let right = (high(0)? + margin + 1).min(size[0]);
+        let bottom = (high(1)? + margin + 1).min(size[1]);
+        let (width, height) = (right - left, bottom - top);
+        let mut mask = Self {
+            left,
+            top,
+            width,
+            height,
+            words: vec![0; (width * height).div_ceil(64)],
+        };
+        for [x, y] in pixels {
+            let (x, y) = (*x as usize - left, *y as usize - top);
+            let columns = x.saturating_sub(margin)..(x + margin + 1).min(width);
+            for row in y.saturating_sub(margin)..(y + margin + 1).min(height) {
+                for column in columns.clone() {
+                    let bit = row * width + column;
+                    mask.words[bit / 64] |= 1 << (bit % 64);
+                }
+            }
+        }
+        Some(mask)
+    }
+}
+
+/// Mean of what is hidden over mean of what is not, at most, after dividing by an ideal light: a
+/// head in front of the target is lit only by what the target scatters.
+const DARKEST_RATIO: f64 = 0.2;
+/// Pixels about the threshold, as a share of the dark ones, at most: an edge is narrow, while
+/// shading runs through all levels.
+const VALLEY_SHARE: f64 = 0.5;
+/// Levels about the threshold that count as the valley, relative to it.
+const VALLEY: [f64; 2] = [0.6, 1.4];
+/// A second threshold, relative to the median, for what is too small for Otsu to see.
+const SMALL_THRESHOLD: f64 = 0.25;
+/// Growth of the mask for blur and penumbra: this share of the frame's width, at least 2 pixels.
+const MARGIN_WIDTHS: f64 = 0.005;
+const LEVELS: usize = 256;
+
+/// The mask of what hides the material in a frame of the reference, or `None` when nothing does.
+///
+/// Otsu's method always finds a threshold; it is believed only when the two classes it makes are
+/// those of an occlusion: the dark one far darker than an ideal light explains, and hardly a pixel
+/// between them.
+pub fn find_occlusion(
+    frame: &Frame,
+    registration: &Registration,
+    light: Direction,
+    rig: &Rig,
+) -> Option<Mask> {
+    let pixels = material_pixels(frame, registration, light, rig)?;
+    let mut sorted: Vec<f32> = pixels.iter().map(|p| p.1).collect();
+    let middle = sorted.len() / 2;
+    let median = f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1);
+    // With half of the material hidden the median says little, but the brightest still do.
+    let top = sorted.len() - 1 - sorted.len() / 50;
+    let bright = f64::from(*sorted.select_nth_unstable_by(top, f32::total_cmp).1);
+    if bright.is_nan() || bright <= 0.0 {
+        return None;
+    }
+    let histogram = histogram(&pixels, bright);
+    let otsu = otsu_level(&histogram) as f64 * bright / LEVELS as f64;
+    let threshold = [otsu, SMALL_THRESHOLD * median.max(0.3 * bright)]
+        .into_iter()
+        .find(|t| is_occlusion(&pixels, *t))? as f32;
+    let hidden: Vec<[u32; 2]> = pixels
+        .iter()
+        .filter(|p| p.1 < threshold)
+        .map(|p| p.0)
+        .collect();
+    let margin = ((MARGIN_WIDTHS * frame.width as f64).ceil() as usize).max(2);
+    Mask::grown(&hidden, margin, [frame.width, frame.height])
+}
+
+/// The material's pixels with their luminance over an ideal light's; `None` without any.
+fn material_pixels(
+    frame: &Frame,
+    registration: &Registration,
+    light: Direction,
+    rig: &Rig,
+) -> Option<Vec<([u32; 2], f32)>> {
+    let target_from_pixel = registration.pixel_from_target.inverse()?;
+    let half = rig.target.material_half_mm;
+    // Pixels on the material's edge are part desk.
+    let jacobian = registration.pixel_from_target.jacobian([0.0; 2]);
+    let px_per_mm = |axis: usize| jacobian[axis][0].hypot(jacobian[axis][1]);
+    let inset = [0, 1].map(|axis| half - 3.0 / px_per_mm(axis).max(1e-6));
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+        .map(|c: [f64; 2]| registration.project([c[0] * inset[0], c[1] * inset[1]]));
+    let range = |axis: usize, size: usize| {
+        let low = corners
+            .iter()
+            .map(|c| c[axis])
+            .fold(f64::INFINITY, f64::min);
+        let high = corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
+        low.floor().max(0.0) as usize..(high.ceil().max(0.0) as usize).min(size)
+    };
+    let ideal_light = IdealLight::new(light, rig.light.distance_m);
+    let mut pixels = Vec::new();
+    for row in range(1, frame.height) {
+        for column in range(0, frame.width) {
+            let pixel = [column as f64 + 0.5, row as f64 + 0.5];
+            let at = target_from_pixel.apply(registration.camera().undistort(pixel));
+            if at[0].abs() > inset[0] || at[1].abs() > inset[1] {
+                continue;
+            }
+            let value = luminance(frame.rgb[row * frame.width + column]);
+            if value.is_finite() {
+                let relative = value / ideal_light.irradiance(at) as f32;
+                pixels.push(([column as u32, row as u32], relative));
+            }
+        }
+    }
+    (!pixels.is_empty()).then_some(pixels)
+}
+
+/// An ideal point light over the target.
+pub struct IdealLight {
+    at_mm: [f64; 3],
+    distance_mm: f64,
+}
+
+impl IdealLight {
+    /// At a distance from the centre, in a direction.
+    pub fn new(light: Direction, distance_m: f64) -> Self {
+        let distance_mm = distance_m * 1000.0;
+        Self {
+            at_mm: light.to_vec3().map(|c| c * distance_mm),
+            distance_mm,
+        }
+    }
+
+    /// Irradiance cos θi · (d0/d)² at a point of the target (mm), 1 below the light at its distance.
+    pub fn irradiance(&self, at_mm: [f64; 2]) -> f64 {
+        let d = [self.at_mm[0] - at_mm[0], self.at_mm[1] - at_mm[1]];
+        let z = self.at_mm[2];
+        let inverse2 = 1.0 / (d[0] * d[0] + d[1] * d[1] + z * z);
+        z * inverse2.sqrt() * self.distance_mm * self.distance_mm * inverse2
+    }
+}
+
+fn histogram(pixels: &[([u32; 2], f32)], bright: f64) -> [u32; LEVELS] {
+    let scale = (LEVELS as f64 / bright) as f32;
+    let mut histogram = [0; LEVELS];
+    for (_, value) in pixels {
+        histogram[((value * scale).max(0.0) as usize).min(LEVELS - 1)] += 1;
+    }
+    histogram
+}
+
+/// Otsu's level: the first of the upper class, for the largest variance between the classes.
+fn otsu_level(histogram: &[u32; LEVELS]) -> usize {
+    let total: f64 = histogram.iter().map(|n| f64::from(*n)).sum();
+    let moment: f64 = (0..LEVELS)
+        .map(|i| i as f64 * f64::from(histogram[i]))
+        .sum();
+    let (mut below, mut below_moment) = (0.0, 0.0);
+    let (mut best, mut best_level) = (0.0, 0);
+    for (i, n) in histogram.iter().enumerate() {
+        let above = total - below;
+        if below > 0.0 && above > 0.0 {
+            let apart = below_moment / below - (moment - below_moment) / above;
+            let between = below * above * apart * apart;
+            // Across an empty valley all levels are as good: the middle of it is wanted.
+            if between > best * (1.0 + 1e-9) {
+                (best, best_level) = (between, i);
+            }
+        }
+        below += f64::from(*n);
+        below_moment += i as f64 * f64::from(*n);
+    }
+    let empty = histogram[best_level..].iter().take_while(|n| **n == 0);
+    best_level + empty.count() / 2
+}
+
+fn is_occlusion(pixels: &[([u32; 2], f32)], threshold: f64) -> bool {
+    let (mut dark, mut bright) = ((0u32, 0.0), (0u32, 0.0));
+    let mut between = 0u32;
+    for (_, value) in pixels {
+        let value = f64::from(*value);
+        let class = if value < threshold {
+            &mut dark
+        } else {
+            &mut bright
+        };
+        class.0 += 1;
+        class.1 += value;
+        let relative = value / threshold;
+        between += u32::from(relative > VALLEY[0] && relative < VALLEY[1]);
+    }
+    dark.0 > 0
+        && bright.0 > 0
+        && dark.1 / f64::from(dark.0) < DARKEST_RATIO * bright.1 / f64::from(bright.0)
+        && f64::from(between) <= VALLEY_SHARE * f64::from(dark.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_hides_what_was_marked_and_its_margin() {
+        let mask = Mask::grown(&[[5, 5], [6, 5]], 2, [20, 20]).unwrap();
+        assert!(mask.hides(3, 3) && mask.hides(8, 7));
+        assert!(!mask.hides(9, 5) && !mask.hides(5, 8) && !mask.hides(2, 5));
+        assert_eq!(mask.count(), 6 * 5);
+        let corner = Mask::grown(&[[0, 19]], 2, [20, 20]).unwrap();
+        assert!(corner.hides(0, 19) && corner.hides(2, 17) && !corner.hides(0, 16));
+        assert!(Mask::grown(&[], 2, [20, 20]).is_none());
+    }
+
+    #[test]
+    fn otsu_splits_two_heaps_between_them() {
+        let mut histogram = [0; LEVELS];
+        for i in 0..5 {
+            histogram[3 + i] = 40;
+            histogram[180 + i] = 300;
+        }
+        assert!((9..=180).contains(&otsu_level(&histogram)));
+    }
+
+    #[test]
+    fn shading_through_all_levels_is_no_occlusion() {
+        let ramp: Vec<_> = (0..1000u32)
+            .map(|i| ([i, 0], 0.02 + i as f32 * 1e-3))
+            .collect();
+        assert!(!is_occlusion(&ramp, 0.3));
+        let step: Vec<_> = (0..1000u32)
+            .map(|i| ([i, 0], if i < 100 { 0.015 } else { 1.0 }))
+            .collect();
+        assert!(is_occlusion(&step, 0.3));
+    }
+}

@@ -1,0 +1,104 @@
+//! The light: a point source with a beam that is neither uniform nor centred.
+
+use super::optics::axes;
+use gonia_brdf::direction::{Direction, Vec3, dot};
+
+/// A smooth beam, Gaussian in the tangent of the angle off its own axis, which does not quite point
+/// at the target's centre. Relative to its value at the centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam {
+    /// Standard deviation, as an angle in degrees.
+    pub width_deg: f64,
+    /// Where the beam's axis points, right and up of the centre as the light sees it, degrees.
+    pub axis_deg: [f64; 2],
+}
+
+impl Default for Beam {
+    /// About 15 % darker at the far edge of the disc than at the centre.
+    fn default() -> Self {
+        Self {
+            width_deg: 26.0,
+            axis_deg: [2.0, -1.5],
+        }
+    }
+}
+
+/// The irradiance over the target.
+pub struct LightField {
+    at_m: Vec3,
+    direction: Vec3,
+    right: Vec3,
+    up: Vec3,
+    distance_m: f64,
+    beam: Option<PreparedBeam>,
+}
+
+struct PreparedBeam {
+    axis: [f64; 2],
+    scale: f64,
+    at_centre: f64,
+}
+
+impl LightField {
+    pub fn new(distance_m: f64, light: Direction, beam: Option<Beam>) -> Self {
+        let (right, up) = axes(light);
+        let direction = light.to_vec3();
+        Self {
+            at_m: direction.map(|c| c * distance_m),
+            direction,
+            right,
+            up,
+            distance_m,
+            beam: beam.map(|b| {
+                let axis = b.axis_deg.map(|a| a.to_radians().tan());
+                let scale = -0.5 / b.width_deg.to_radians().tan().powi(2);
+                PreparedBeam {
+                    axis,
+                    scale,
+                    at_centre: scale * (axis[0] * axis[0] + axis[1] * axis[1]),
+                }
+            }),
+        }
+    }
+
+    /// The unit vector towards the light and the irradiance at a point of the target (metres).
+    pub fn at(&self, point_m: [f64; 2]) -> (Vec3, f64) {
+        let to = [
+            self.at_m[0] - point_m[0],
+            self.at_m[1] - point_m[1],
+            self.at_m[2],
+        ];
+        let inverse2 = 1.0 / dot(to, to);
+        let inverse = inverse2.sqrt();
+        let unit = to.map(|c| c * inverse);
+        let fall_off = self.distance_m * self.distance_m * inverse2;
+        let beam = match &self.beam {
+            Some(beam) => self.beam_at(beam, point_m),
+            None => 1.0,
+        };
+        (unit, beam * unit[2].max(0.0) * fall_off)
+    }
+
+    fn beam_at(&self, beam: &PreparedBeam, p: [f64; 2]) -> f64 {
+        let depth = self.distance_m - self.direction[0] * p[0] - self.direction[1] * p[1];
+        let u = (self.right[0] * p[0] + self.right[1] * p[1]) / depth - beam.axis[0];
+        let v = (self.up[0] * p[0] + self.up[1] * p[1]) / depth - beam.axis[1];
+        (beam.scale * (u * u + v * v) - beam.at_centre).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn irradiance_is_one_at_the_centre_and_falls_with_distance_and_cosine() {
+        let normal = LightField::new(1.1, Direction::from_deg(0.0, 0.0), Some(Beam::default()));
+        assert!((normal.at([0.0; 2]).1 - 1.0).abs() < 1e-12);
+        let point = LightField::new(1.1, Direction::from_deg(60.0, 0.0), None);
+        assert!((point.at([0.0; 2]).1 - 0.5).abs() < 1e-12);
+        // Straight below the light: closer and at normal incidence.
+        let below = 1.1 * 60f64.to_radians().sin();
+        assert!((point.at([below, 0.0]).1 - 4.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,374 @@
+//! What the camera sees: a flat target with four bright lines and a material on a dark desk, lit by
+//! a point source with a non-uniform beam, the light's head and arm sometimes in the way, and the
+//! noise of a sensor. No more than the measurement can see: a BRDF at each pixel, no yarn.
+//!
+//! Radiance is linear. At the centre of the target and at normal incidence the irradiance is
+//! exactly 1, so that radiance over cos θi is the BRDF there, and eq. (3) of the paper returns the
+//! BRDF itself from a perfect chain.
+
+mod light;
+mod noise;
+mod occluder;
+mod optics;
+mod target;
+
+pub use light::Beam;
+pub use noise::Noise;
+pub use occluder::Occluder;
+pub use target::Texture;
+
+use gonia_brdf::direction::{Vec3, local_direction, normalize};
+use gonia_brdf::{Brdf, Pose};
+use light::LightField;
+use noise::NoiseField;
+use occluder::Silhouette;
+use optics::Optics;
+use std::sync::Arc;
+use target::{Paint, TargetMap};
+
+/// Where light, camera and target are, as plain numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneGeometry {
+    /// Distance of the light from the target's centre, metres.
+    pub light_distance_m: f64,
+    /// Distance of the camera from the target's centre, metres.
+    pub camera_distance_m: f64,
+    /// Width of a frame, pixels.
+    pub width_px: usize,
+    /// Height of a frame, pixels.
+    pub height_px: usize,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Principal point, pixels; the centre of the top left pixel is (0.5, 0.5).
+    pub centre_px: [f64; 2],
+    /// Radial distortion, coefficients of r² and r⁴ (r in units of the focal length, undistorted).
+    pub distortion: [f64; 2],
+    /// Standard deviation of the lens's blur, pixels; the pixel's own aperture comes on top.
+    pub blur_px: f64,
+    /// Lines at x = ±a and y = ±a: a, to the centre of the line, mm.
+    pub line_offset_mm: f64,
+    /// Width of a line, mm.
+    pub line_width_mm: f64,
+    /// Half the side of the material's square, mm.
+    pub material_half_mm: f64,
+    /// Half the side of the desk, to whose edge the lines go, mm.
+    pub desk_half_mm: f64,
+}
+
+impl SceneGeometry {
+    /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
+    /// elevation up to 75°.
+    pub fn paper(px: usize) -> Self {
+        Self {
+            light_distance_m: 1.1,
+            camera_distance_m: 1.8,
+            width_px: px,
+            height_px: px,
+            focal_px: 1600.0 / 1024.0 * px as f64,
+            centre_px: [px as f64 / 2.0; 2],
+            distortion: [0.0; 2],
+            blur_px: 0.4,
+            line_offset_mm: 335.0,
+            line_width_mm: 4.0,
+            material_half_mm: 320.0,
+            desk_half_mm: 400.0,
+        }
+    }
+}
+
+/// Which cloth lies on the desk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// The material under test.
+    Material,
+    /// The reference.
+    Reference,
+}
+
+/// A frame of linear radiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderedFrame {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `width · height` pixels, row by row from the top left.
+    pub rgb: Vec<[f32; 3]>,
+}
+
+/// A rig with its light, its target and its camera.
+#[derive(Clone)]
+pub struct Scene {
+    /// Where everything is.
+    pub geometry: SceneGeometry,
+    /// The material under test.
+    pub material: Arc<dyn Brdf>,
+    /// The reference.
+    pub reference: Arc<dyn Brdf>,
+    /// The sensor's noise; `None` for an ideal sensor.
+    pub noise: Option<Noise>,
+    /// The light's beam; `None` for a source that is the same in all directions.
+    pub beam: Option<Beam>,
+    /// The light's head and arm, which hide the target from some views; `None` to leave them out.
+    pub occluder: Option<Occluder>,
+    /// Spatial inhomogeneity of the material; off by default.
+    pub texture: Option<Texture>,
+    /// Seed of the noise and of the texture.
+    pub seed: u64,
+}
+
+impl Scene {
+    /// A scene with the default noise, beam and occluder, and no texture.
+    pub fn new(
+        geometry: SceneGeometry,
+        material: Arc<dyn Brdf>,
+        reference: Arc<dyn Brdf>,
+        seed: u64,
+    ) -> Self {
+        Self {
+            geometry,
+            material,
+            reference,
+            noise: Some(Noise::default()),
+            beam: Some(Beam::default()),
+            occluder: Some(Occluder::default()),
+            texture: None,
+            seed,
+        }
+    }
+
+    /// The frame taken at the true shaft angles `pose`. The noise depends on the scene's seed and
+    /// on `shot` alone, so that frames may be rendered in any order on any number of threads.
+    pub fn render(&self, which: Surface, pose: Pose, shot: u64) -> RenderedFrame {
+        let painter = Painter::new(self, which, pose);
+        let mut rgb = Vec::with_capacity(self.geometry.width_px * self.geometry.height_px);
+        for row in 0..self.geometry.height_px {
+            for column in 0..self.geometry.width_px {
+                rgb.push(painter.radiance(column, row));
+            }
+        }
+        if let Some(noise) = self.noise {
+            let typical = painter.typical_radiance();
+            NoiseField::new(noise, typical, self.seed, shot).add_to(&mut rgb);
+        }
+        RenderedFrame {
+            width: self.geometry.width_px,
+            height: self.geometry.height_px,
+            rgb,
+        }
+    }
+}
+
+/// All that is the same for the pixels of a frame.
+struct Painter<'a> {
+    pose: Pose,
+    brdf: &'a dyn Brdf,
+    texture: Option<(Texture, u64)>,
+    optics: Optics,
+    target: TargetMap,
+    light: LightField,
+    camera_at_m: Vec3,
+    silhouette: Option<Silhouette>,
+}
+
+impl<'a> Painter<'a> {
+    fn new(scene: &'a Scene, which: Surface, pose: Pose) -> Self {
+        let geometry = &scene.geometry;
+        let optics = Optics::new(geometry, pose.view);
+        let brdf = match which {
+            Surface::Material => scene.material.as_ref(),
+            Surface::Reference => scene.reference.as_ref(),
+        };
+        let texture = match which {
+            Surface::Material => scene.texture.map(|t| (t, scene.seed)),
+            Surface::Reference => None,
+        };
+        Self {
+            pose,
+            brdf,
+            texture,
+            target: TargetMap::new(geometry),
+            light: LightField::new(geometry.light_distance_m, pose.light, scene.beam),
+            camera_at_m: pose.view.to_vec3().map(|c| c * geometry.camera_distance_m),
+            silhouette: scene
+                .occluder
+                .and_then(|o| Silhouette::new(o, geometry.light_distance_m, pose.light, &optics)),
+            optics,
+        }
+    }
+
+    /// Mean radiance at the target's centre: what the exposure is chosen for.
+    fn typical_radiance(&self) -> f64 {
+        let (light, view) = (self.pose.light.to_vec3(), self.pose.view.to_vec3());
+        let f = self.brdf.eval(light, view);
+        (f[0] + f[1] + f[2]) / 3.0 * light[2]
+    }
+
+    fn radiance(&self, column: usize, row: usize) -> [f32; 3] {
+        let pixel = [column as f64 + 0.5, row as f64 + 0.5];
+        let seen = match self.optics.target_point_mm(pixel) {
+            Some(point) => self.target_radiance(pixel, point),
+            None => [0.0; 3],
+        };
+        let Some(silhouette) = &self.silhouette else {
+            return seen.map(|l| l as f32);
+        };
+        let hidden = silhouette.coverage(pixel);
+        seen.map(|l| (l * (1.0 - hidden) + hidden * silhouette.radiance) as f32)
+    }
+
+    fn target_radiance(&self, pixel: [f64; 2], point_mm: [f64; 2]) -> [f64; 3] {
+        let sigma_mm = || self.optics.blur_mm(pixel);
+        let Some(Paint { material, grey }) = self.target.paint(point_mm, sigma_mm) else {
+            return [0.0; 3];
+        };
+        let point_m = point_mm.map(|c| c * 1e-3);
+        let (to_light, irradiance) = self.light.at(point_m);
+        let mut radiance = [grey * irradiance; 3];
+        if material > 0.0 {
+            let to_camera = normalize([
+                self.camera_at_m[0] - point_m[0],
+                self.camera_at_m[1] - point_m[1],
+                self.camera_at_m[2],
+            ]);
+            let scale = match self.texture {
+                Some((texture, seed)) => texture.factor(point_mm, seed),
+                None => 1.0,
+            } * material
+                * irradiance;
+            let f = self.brdf.eval(to_light, to_camera);
+            for c in 0..3 {
+                radiance[c] += scale * f[c];
+            }
+        }
+        radiance
+    }
+}
+
+/// The BRDF that a perfect measurement finds at a point of the target (mm): the surface's value at
+/// the point's local directions.
+pub fn true_brdf(
+    brdf: &dyn Brdf,
+    geometry: &SceneGeometry,
+    pose: Pose,
+    point_mm: [f64; 2],
+) -> [f64; 3] {
+    let point_m = point_mm.map(|c| c * 1e-3);
+    brdf.eval(
+        local_direction(pose.light, geometry.light_distance_m, point_m),
+        local_direction(pose.view, geometry.camera_distance_m, point_m),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_brdf::Direction;
+    use gonia_brdf::model::Kurt;
+
+    fn scene(px: usize) -> Scene {
+        Scene::new(
+            SceneGeometry::paper(px),
+            Arc::new(Kurt::two_thread_fabric()),
+            Arc::new(Kurt::white_reference_fabric()),
+            7,
+        )
+    }
+
+    fn pose(ti: f64, pi: f64, tv: f64, pv: f64) -> Pose {
+        Pose {
+            light: Direction::from_deg(ti, pi),
+            view: Direction::from_deg(tv, pv),
+        }
+    }
+
+    #[test]
+    fn central_radiance_over_cosine_is_the_brdf() {
+        let mut scene = scene(401);
+        scene.noise = None;
+        let at = pose(60.0, 20.0, 30.0, 250.0);
+        let frame = scene.render(Surface::Material, at, 0);
+        let centre = frame.rgb[200 * 401 + 200];
+        let f = true_brdf(scene.material.as_ref(), &scene.geometry, at, [0.0; 2]);
+        for c in 0..3 {
+            let measured = f64::from(centre[c]) / at.light.theta.cos();
+            assert!((measured / f[c] - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_frame_depends_on_seed_and_shot_alone() {
+        let scene = scene(64);
+        let at = pose(15.0, 0.0, 45.0, 90.0);
+        let first = scene.render(Surface::Reference, at, 3);
+        assert_eq!(first, scene.render(Surface::Reference, at, 3));
+        assert_ne!(first, scene.render(Surface::Reference, at, 4));
+        let other = Scene { seed: 8, ..scene };
+        assert_ne!(first, other.render(Surface::Reference, at, 3));
+    }
+
+    #[test]
+    fn noise_is_about_one_percent_at_a_typical_pixel_and_unbiased() {
+        let noisy = scene(200);
+        let mut clean = noisy.clone();
+        clean.noise = None;
+        let at = pose(30.0, 10.0, 15.0, 200.0);
+        let (a, b) = (
+            noisy.render(Surface::Reference, at, 1),
+            clean.render(Surface::Reference, at, 1),
+        );
+        let mut errors = Vec::new();
+        for row in 80..120 {
+            for column in 80..120 {
+                let i = row * 200 + column;
+                errors.extend((0..3).map(|c| f64::from(a.rgb[i][c] / b.rgb[i][c]) - 1.0));
+            }
+        }
+        let n = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / n;
+        let sd = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        assert!(mean.abs() < 4.0 * sd / n.sqrt(), "{mean}");
+        assert!((0.008..0.013).contains(&sd), "{sd}");
+    }
+
+    #[test]
+    fn the_lights_head_hides_the_centre_when_it_is_in_the_way() {
+        let mut scene = scene(200);
+        scene.noise = None;
+        let at = pose(30.0, 60.0, 30.0, 60.0);
+        let hidden = scene.render(Surface::Reference, at, 0).rgb[100 * 200 + 100];
+        scene.occluder = None;
+        let open = scene.render(Surface::Reference, at, 0).rgb[100 * 200 + 100];
+        assert!(hidden[1] < 0.03 * open[1] && hidden[1] > 0.0);
+    }
+
+    #[test]
+    fn lines_thinner_than_a_pixel_keep_their_light() {
+        // At θv = 75° and 200 px a line is 0.2 px thick: what it adds to the light of its
+        // neighbourhood must not depend on where it falls between the pixels' centres.
+        let mut scene = scene(200);
+        scene.noise = None;
+        scene.beam = None;
+        scene.occluder = None;
+        scene.geometry.material_half_mm = 100.0;
+        let light_above_centre = |scene: &Scene| {
+            let frame = scene.render(Surface::Material, pose(0.0, 0.0, 75.0, 0.0), 0);
+            // The far line, x = −335 mm, is 12.8 rows above the centre.
+            (80..94)
+                .map(|row| f64::from(frame.rgb[row * 200 + 100][1]))
+                .sum::<f64>()
+        };
+        let mut added = Vec::new();
+        for shift in 0..5 {
+            scene.geometry.centre_px[1] = 100.0 + 0.2 * f64::from(shift);
+            scene.geometry.line_width_mm = 4.0;
+            let with = light_above_centre(&scene);
+            scene.geometry.line_width_mm = 0.0;
+            added.push(with - light_above_centre(&scene));
+        }
+        let mean = added.iter().sum::<f64>() / added.len() as f64;
+        for one in &added {
+            assert!((one / mean - 1.0).abs() < 0.02, "{added:?}");
+        }
+    }
+}

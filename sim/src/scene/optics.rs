@@ -1,0 +1,158 @@
+//! The pinhole camera on its arm.
+
+use super::SceneGeometry;
+use gonia_brdf::direction::{Direction, Vec3, dot};
+
+/// A camera at a pose: maps between pixels and the target's plane.
+pub struct Optics {
+    right: Vec3,
+    up: Vec3,
+    back: Vec3,
+    distance_m: f64,
+    focal_px: f64,
+    centre_px: [f64; 2],
+    distortion: [f64; 2],
+    sigma_px: f64,
+    size_px: [f64; 2],
+    /// Rows of the homography (x, y, 1) mm · w from (column, row, 1) pixels.
+    target_from_pixel: [Vec3; 3],
+}
+
+/// Image axes of something at `d` that looks at the centre: right (−sin φ, cos φ, 0) and up −∂d/∂θ.
+pub fn axes(d: Direction) -> (Vec3, Vec3) {
+    let (st, ct) = d.theta.sin_cos();
+    let (sp, cp) = d.phi.sin_cos();
+    ([-sp, cp, 0.0], [-ct * cp, -ct * sp, st])
+}
+
+impl Optics {
+    pub fn new(geometry: &SceneGeometry, view: Direction) -> Self {
+        let (right, up) = axes(view);
+        let back = view.to_vec3();
+        let (f, c, distance) = (
+            geometry.focal_px,
+            geometry.centre_px,
+            geometry.camera_distance_m,
+        );
+        // Ray of a pixel: −back + right·(px − cx)/f − up·(py − cy)/f; it meets z = 0 at
+        // camera − ray·camera_z/ray_z. Each of the three numbers is linear in the pixel.
+        let ray = |axis: usize| -> Vec3 {
+            [
+                right[axis] / f,
+                -up[axis] / f,
+                -back[axis] - right[axis] * c[0] / f + up[axis] * c[1] / f,
+            ]
+        };
+        let (rx, ry, rz) = (ray(0), ray(1), ray(2));
+        let at = back.map(|b| b * distance * 1000.0);
+        let row =
+            |along: Vec3, from: f64| -> Vec3 { [0, 1, 2].map(|i| from * rz[i] - at[2] * along[i]) };
+        Self {
+            right,
+            up,
+            back,
+            distance_m: distance,
+            focal_px: f,
+            centre_px: c,
+            distortion: geometry.distortion,
+            // The aperture of a square pixel has a variance of 1/12.
+            sigma_px: (geometry.blur_px * geometry.blur_px + 1.0 / 12.0).sqrt(),
+            size_px: [geometry.width_px as f64, geometry.height_px as f64],
+            target_from_pixel: [row(rx, at[0]), row(ry, at[1]), rz],
+        }
+    }
+
+    /// Where a pixel's ray meets the target's plane, mm; `None` at or above the horizon.
+    pub fn target_point_mm(&self, pixel: [f64; 2]) -> Option<[f64; 2]> {
+        let [x, y, w] = self.homogeneous(self.undistorted(pixel));
+        (w < -1e-9).then(|| [x / w, y / w])
+    }
+
+    /// Standard deviation of the pixel's blurred aperture along x and along y of the target, mm.
+    pub fn blur_mm(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let p = self.undistorted(pixel);
+        let [x, y, w] = self.homogeneous(p);
+        let m = &self.target_from_pixel;
+        let gradient = |value: f64, row: &Vec3| {
+            let du = (row[0] - value * m[2][0]) / w;
+            let dv = (row[1] - value * m[2][1]) / w;
+            self.sigma_px * du.hypot(dv)
+        };
+        [gradient(x / w, &m[0]), gradient(y / w, &m[1])]
+    }
+
+    /// Pixel and pixels per metre at a point of space in front of the camera.
+    pub fn project(&self, point_m: Vec3) -> Option<([f64; 2], f64)> {
+        let depth = self.distance_m - dot(point_m, self.back);
+        if depth <= 1e-3 {
+            return None;
+        }
+        let (x, y) = (
+            dot(point_m, self.right) / depth,
+            -dot(point_m, self.up) / depth,
+        );
+        let r2 = x * x + y * y;
+        let stretch = 1.0 + r2 * (self.distortion[0] + r2 * self.distortion[1]);
+        let pixel = [
+            self.centre_px[0] + self.focal_px * x * stretch,
+            self.centre_px[1] + self.focal_px * y * stretch,
+        ];
+        Some((pixel, self.focal_px / depth))
+    }
+
+    /// Width and height of a frame, pixels.
+    pub fn size_px(&self) -> [f64; 2] {
+        self.size_px
+    }
+
+    fn homogeneous(&self, p: [f64; 2]) -> Vec3 {
+        self.target_from_pixel
+            .map(|row| row[0] * p[0] + row[1] * p[1] + row[2])
+    }
+
+    /// The pixel where a pinhole without distortion would see what this pixel sees.
+    fn undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let [k1, k2] = self.distortion;
+        if k1 == 0.0 && k2 == 0.0 {
+            return pixel;
+        }
+        let xd = [0, 1].map(|i| (pixel[i] - self.centre_px[i]) / self.focal_px);
+        let mut x = xd;
+        for _ in 0..8 {
+            let r2 = x[0] * x[0] + x[1] * x[1];
+            let stretch = 1.0 + r2 * (k1 + r2 * k2);
+            x = xd.map(|c| c / stretch);
+        }
+        [0, 1].map(|i| self.centre_px[i] + self.focal_px * x[i])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_and_points_of_the_target_agree() {
+        let mut geometry = SceneGeometry::paper(400);
+        geometry.distortion = [-0.08, 0.02];
+        for view in [(0.0, 0.0), (30.0, 200.0), (75.0, 45.0)] {
+            let optics = Optics::new(&geometry, Direction::from_deg(view.0, view.1));
+            for point in [[0.0, 0.0], [300.0, -200.0], [-335.0, 335.0]] {
+                let (pixel, _) = optics
+                    .project([point[0] * 1e-3, point[1] * 1e-3, 0.0])
+                    .unwrap();
+                let back = optics.target_point_mm(pixel).unwrap();
+                assert!((back[0] - point[0]).hypot(back[1] - point[1]) < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn the_image_is_upright_and_not_mirrored() {
+        let optics = Optics::new(&SceneGeometry::paper(400), Direction::from_deg(30.0, 90.0));
+        // From +y the camera has −x at its right and the far side, −y, up.
+        let at = |x, y| optics.project([x, y, 0.0]).unwrap().0;
+        assert!(at(-0.1, 0.0)[0] > 200.0);
+        assert!(at(0.0, -0.1)[1] < 200.0);
+    }
+}
