@@ -96,3 +96,72 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     assert_eq!(traces[0], traces[1]);
     assert_ne!(traces[0], traces[2]);
 }
+
+/// The paper's directions: rings of θ with equal steps in φ, every second ring backwards.
+fn rings(rings: &[(f64, usize)]) -> Vec<Direction> {
+    let mut directions = Vec::new();
+    for (i, &(theta, n)) in rings.iter().enumerate() {
+        let mut ring: Vec<_> = (0..n)
+            .map(|k| Direction::from_deg(theta, 360.0 / n as f64 * k as f64))
+            .collect();
+        if i % 2 == 1 {
+            ring.reverse();
+        }
+        directions.extend(ring);
+    }
+    directions
+}
+
+/// The paper's 8505 poses: for each view all lights, to and fro.
+fn papers_poses() -> Vec<Pose> {
+    let sattler = [
+        (0.0, 1),
+        (15.0, 6),
+        (30.0, 12),
+        (45.0, 18),
+        (60.0, 20),
+        (75.0, 24),
+    ];
+    let views = rings(&sattler);
+    let mut lights = rings(&[&sattler[..], &[(85.0, 24)]].concat());
+    let mut poses = Vec::new();
+    for view in views {
+        poses.extend(lights.iter().map(|&light| Pose { light, view }));
+        lights.reverse();
+    }
+    poses
+}
+
+#[test]
+fn the_papers_poses_are_8505() {
+    assert_eq!(papers_poses().len(), 8505);
+}
+
+/// Figures for docs/results.md: `cargo test --release -p gonia-tests --test controllers_session --
+/// --ignored --nocapture`.
+#[test]
+#[ignore = "takes a minute; prints figures"]
+fn material_and_reference_of_the_papers_plan_are_measured() {
+    let mut poses = papers_poses();
+    poses.extend(poses.clone());
+    let began = std::time::Instant::now();
+    let session = run(1, FaultPlan::default(), &poses);
+    let seconds = began.elapsed().as_secs_f64();
+    let mut errors: Vec<f64> = session
+        .shots
+        .iter()
+        .map(|(shot, truth)| true_error_deg(&poses[shot.index], truth))
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    println!("{:?}", session.summary);
+    println!(
+        "{} poses, {:.2} h virtual, {seconds:.1} s; true error p50 {:.4}° p99 {:.4}° max {:.4}°",
+        poses.len(),
+        session.summary.duration_us as f64 / 3.6e9,
+        errors[errors.len() / 2],
+        errors[errors.len() * 99 / 100],
+        errors[errors.len() - 1],
+    );
+    assert_eq!(session.shots.len(), poses.len());
+    assert!(errors[errors.len() - 1] <= POINTING_LIMIT_DEG);
+}
