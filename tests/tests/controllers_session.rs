@@ -3,9 +3,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gonia::capture::{Arms, POINTING_LIMIT_DEG, SessionSummary, Shot, ShotOutcome, run_session};
+use gonia::capture::{
+    Arms, POINTING_LIMIT_DEG, SETTLE_TIME_S, SessionSummary, Shot, ShotOutcome, move_time_s,
+    nearest_turn_deg, run_session,
+};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
+use gonia_protocol::settings::Axis;
 use gonia_sim::fault::{Arm, FaultPlan, WireFaults};
 use gonia_sim::rig::SimRig;
 
@@ -164,4 +168,30 @@ fn material_and_reference_of_the_papers_plan_are_measured() {
     );
     assert_eq!(session.shots.len(), poses.len());
     assert!(errors[errors.len() - 1] <= POINTING_LIMIT_DEG);
+}
+
+#[test]
+fn the_planners_times_are_those_of_the_arms() {
+    let poses = poses(60);
+    let session = run(3, FaultPlan::default(), &poses);
+    let triggers = session.rig.triggers();
+    let mut predicted_s = 0.0;
+    let mut phi = [triggers[0].light_deg[1], triggers[0].camera_deg[1]];
+    for pair in poses.windows(2) {
+        let mut slowest_s: f64 = 0.0;
+        let arms = [(pair[0].light, pair[1].light), (pair[0].view, pair[1].view)];
+        for (phi, (from, to)) in phi.iter_mut().zip(arms) {
+            let next = nearest_turn_deg(*phi, to.phi_deg(), [-185.0, 545.0]).unwrap();
+            slowest_s = slowest_s
+                .max(move_time_s(Axis::Phi, *phi, next))
+                .max(move_time_s(Axis::Theta, from.theta_deg(), to.theta_deg()));
+            *phi = next;
+        }
+        predicted_s += slowest_s + SETTLE_TIME_S;
+    }
+    let took_s = (triggers[59].time_us - triggers[0].time_us) as f64 * 1e-6;
+    assert!(
+        (took_s / predicted_s - 1.0).abs() < 0.05,
+        "{took_s} {predicted_s}"
+    );
 }
