@@ -66,7 +66,8 @@ pub enum Key {
     Deadband = 13,
     /// How long the encoder must stay within the deadband, µs.
     SettleWindow = 14,
-    /// How long ringing may last before a correction is made, µs.
+    /// How long ringing may last before a correction is made, µs. The correction is the mean over
+    /// the second half, which must be at least a period of the ringing.
     SettlePatience = 15,
     /// Corrections allowed for one target.
     MaxCorrections = 16,
@@ -205,7 +206,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "settle_patience",
         "µs",
         (20_000, 10_000_000),
-        [160_000; 2],
+        [240_000; 2],
     ),
     m(Key::MaxCorrections, "max_corrections", "", (0, 50), [6; 2]),
     m(

@@ -12,6 +12,9 @@ use core::f64::consts::TAU;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+/// Steps further apart than this belong to two runs, µs.
+const NEW_RUN_US: u64 = 50_000;
+
 /// What an axis is made of. Angles of the shaft in µdeg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantConfig {
@@ -31,7 +34,7 @@ pub struct PlantConfig {
     pub worm_turn_udeg: f64,
     /// Amplitude of the motor's deviation between full steps, periodic in the magnetic cycle.
     pub microstep_error_udeg: f64,
-    /// Amplitude of the arm's swing when a run ends.
+    /// Amplitude of the arm's swing when a run at full speed ends.
     pub ring_udeg: f64,
     /// Frequency of the swing, Hz.
     pub ring_hz: f64,
@@ -98,9 +101,11 @@ pub struct AxisPlant {
     slipped_udeg: f64,
     /// Steps/s of the last step, signed.
     rate: f64,
+    /// The fastest step of this run, steps/s.
+    peak_rate: f64,
     last_step_us: u64,
     switch_closed: bool,
-    switch_changed_us: u64,
+    switch_chatters_until_us: u64,
     stalled_until_us: u64,
     encoder_lost_until_us: u64,
     encoder_offset_udeg: f64,
@@ -118,9 +123,10 @@ impl AxisPlant {
             output_udeg: config.start_udeg,
             slipped_udeg: 0.0,
             rate: 0.0,
+            peak_rate: 0.0,
             last_step_us: 0,
             switch_closed: config.start_udeg <= config.home_udeg,
-            switch_changed_us: 0,
+            switch_chatters_until_us: 0,
             stalled_until_us: 0,
             encoder_lost_until_us: 0,
             encoder_offset_udeg: 0.0,
@@ -141,6 +147,8 @@ impl AxisPlant {
         let rate = direction * 1e6 / interval_us as f64;
         let jump = libm::fabs(rate - self.rate);
         self.rate = rate;
+        let is_new_run = interval_us > NEW_RUN_US;
+        self.peak_rate = libm::fabs(rate).max(if is_new_run { 0.0 } else { self.peak_rate });
         if jump > self.config.pull_in_steps_s && libm::fabs(rate) > self.config.pull_in_steps_s
             || libm::fabs(rate) > self.config.pull_out_steps_s
         {
@@ -184,9 +192,9 @@ impl AxisPlant {
         let closed = self.output_udeg + self.slipped_udeg <= self.config.home_udeg;
         if closed != self.switch_closed {
             self.switch_closed = closed;
-            self.switch_changed_us = now_us;
+            self.switch_chatters_until_us = now_us + self.config.bounce_us;
         }
-        if now_us < self.switch_changed_us + self.config.bounce_us {
+        if now_us < self.switch_chatters_until_us {
             self.rng.next_u32() & 1 == 0
         } else {
             closed
@@ -245,7 +253,11 @@ impl AxisPlant {
         if self.last_step_us == 0 || since_s > 12.0 * self.config.ring_decay_s {
             return 0.0;
         }
-        let amplitude = self.config.ring_udeg * libm::exp(-since_s / self.config.ring_decay_s);
+        // A short run ends before the arm has bent as far as its deceleration would bend it: then
+        // it swings with what speed it had, v/ω, and with a step at least.
+        let from_speed = self.peak_rate * self.step_udeg / (TAU * self.config.ring_hz);
+        let amplitude = from_speed.max(self.step_udeg).min(self.config.ring_udeg);
+        let amplitude = amplitude * libm::exp(-since_s / self.config.ring_decay_s);
         let sign = if self.rate < 0.0 { -1.0 } else { 1.0 };
         sign * amplitude * libm::sin(TAU * self.config.ring_hz * since_s)
     }

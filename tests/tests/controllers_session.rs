@@ -3,9 +3,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gonia::capture::{Arms, POINTING_LIMIT_DEG, SessionSummary, Shot, ShotOutcome, run_session};
+use gonia::capture::{
+    Arms, POINTING_LIMIT_DEG, SETTLE_TIME_S, SessionSummary, Shot, ShotOutcome, move_time_s,
+    nearest_turn_deg, run_session,
+};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
+use gonia_protocol::settings::Axis;
 use gonia_sim::fault::{Arm, FaultPlan, WireFaults};
 use gonia_sim::rig::SimRig;
 
@@ -95,4 +99,99 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
         .to_vec();
     assert_eq!(traces[0], traces[1]);
     assert_ne!(traces[0], traces[2]);
+}
+
+/// The paper's directions: rings of θ with equal steps in φ, every second ring backwards.
+fn rings(rings: &[(f64, usize)]) -> Vec<Direction> {
+    let mut directions = Vec::new();
+    for (i, &(theta, n)) in rings.iter().enumerate() {
+        let mut ring: Vec<_> = (0..n)
+            .map(|k| Direction::from_deg(theta, 360.0 / n as f64 * k as f64))
+            .collect();
+        if i % 2 == 1 {
+            ring.reverse();
+        }
+        directions.extend(ring);
+    }
+    directions
+}
+
+/// The paper's 8505 poses: for each view all lights, to and fro.
+fn papers_poses() -> Vec<Pose> {
+    let sattler = [
+        (0.0, 1),
+        (15.0, 6),
+        (30.0, 12),
+        (45.0, 18),
+        (60.0, 20),
+        (75.0, 24),
+    ];
+    let views = rings(&sattler);
+    let mut lights = rings(&[&sattler[..], &[(85.0, 24)]].concat());
+    let mut poses = Vec::new();
+    for view in views {
+        poses.extend(lights.iter().map(|&light| Pose { light, view }));
+        lights.reverse();
+    }
+    poses
+}
+
+#[test]
+fn the_papers_poses_are_8505() {
+    assert_eq!(papers_poses().len(), 8505);
+}
+
+/// Figures for docs/results.md: `cargo test --release -p gonia-tests --test controllers_session --
+/// --ignored --nocapture`.
+#[test]
+#[ignore = "takes a minute; prints figures"]
+fn material_and_reference_of_the_papers_plan_are_measured() {
+    let mut poses = papers_poses();
+    poses.extend(poses.clone());
+    let began = std::time::Instant::now();
+    let session = run(1, FaultPlan::default(), &poses);
+    let seconds = began.elapsed().as_secs_f64();
+    let mut errors: Vec<f64> = session
+        .shots
+        .iter()
+        .map(|(shot, truth)| true_error_deg(&poses[shot.index], truth))
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    println!("{:?}", session.summary);
+    println!(
+        "{} poses, {:.2} h virtual, {seconds:.1} s; true error p50 {:.4}° p99 {:.4}° max {:.4}°",
+        poses.len(),
+        session.summary.duration_us as f64 / 3.6e9,
+        errors[errors.len() / 2],
+        errors[errors.len() * 99 / 100],
+        errors[errors.len() - 1],
+    );
+    assert_eq!(session.shots.len(), poses.len());
+    assert!(errors[errors.len() - 1] <= POINTING_LIMIT_DEG);
+}
+
+#[test]
+fn the_planners_times_are_those_of_the_arms() {
+    let poses = poses(60);
+    let session = run(3, FaultPlan::default(), &poses);
+    let triggers = session.rig.triggers();
+    let mut predicted_s = 0.0;
+    let mut phi = [triggers[0].light_deg[1], triggers[0].camera_deg[1]];
+    for pair in poses.windows(2) {
+        let mut slowest_s: f64 = 0.0;
+        let arms = [(pair[0].light, pair[1].light), (pair[0].view, pair[1].view)];
+        for (phi, (from, to)) in phi.iter_mut().zip(arms) {
+            let next = nearest_turn_deg(*phi, to.phi_deg(), [-185.0, 545.0]).unwrap();
+            slowest_s = slowest_s
+                .max(move_time_s(Axis::Phi, *phi, next))
+                .max(move_time_s(Axis::Theta, from.theta_deg(), to.theta_deg()));
+            *phi = next;
+        }
+        predicted_s += slowest_s + SETTLE_TIME_S;
+    }
+    let took_s = (triggers[59].time_us - triggers[0].time_us) as f64 * 1e-6;
+    assert!(
+        (took_s / predicted_s - 1.0).abs() < 0.05,
+        "{took_s} {predicted_s}"
+    );
 }

@@ -145,12 +145,17 @@ impl AxisDrive {
         self.begin(Profile::new(count, ramp), now_us * TICKS_PER_US, steps > 0);
     }
 
-    /// Starts a run to an absolute angle; the last part of the way always leads up, so that the
-    /// gear's backlash is taken from one side.
+    /// Starts a run to an absolute angle.
     pub fn go_to(&mut self, now_us: u64, target_udeg: i32, settings: &Settings) {
+        let way_udeg = i64::from(target_udeg) - i64::from(self.encoder.udeg);
+        self.go_by(now_us, way_udeg, settings);
+    }
+
+    /// Starts a run over an angle; its last part always leads up, so that the gear's backlash is
+    /// taken from one side.
+    pub fn go_by(&mut self, now_us: u64, way_udeg: i64, settings: &Settings) {
         let ramp = self.ramp(settings, Key::MaxSpeed);
-        let way = i64::from(target_udeg) - i64::from(self.encoder.udeg);
-        let steps = self.steps_of(way);
+        let steps = self.steps_of(way_udeg);
         if steps >= 0 {
             self.run(now_us, steps, ramp);
             return;

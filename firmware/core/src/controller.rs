@@ -265,7 +265,7 @@ impl Controller {
         for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
             drive.clear_following();
             let closed = hardware.home_switch_closed(drive.axis());
-            *homing = Some(Homing::begin(now_us, closed, drive, &self.settings));
+            *homing = Some(Homing::begin(closed));
         }
         self.job = Some(request);
         self.enter(State::Homing, now_us);
@@ -534,7 +534,8 @@ impl Controller {
                 }
                 self.corrections[i] += 1;
                 drive.note_correction(error, &self.settings);
-                drive.go_to(now_us, self.target_udeg[i], &self.settings);
+                // The mean, not the last reading: that one has the noise and the swing in it.
+                drive.go_by(now_us, -i64::from(error), &self.settings);
                 self.settle[i] = None;
                 Ok(false)
             }

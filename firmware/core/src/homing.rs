@@ -19,6 +19,8 @@ const MAX_BELOW: i64 = 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
+    /// At rest, until the switch's reading is steady.
+    Look,
     /// Fast, down, until the switch closes.
     Seek,
     /// Slowing down below the switch.
@@ -46,29 +48,12 @@ pub struct Homing {
 
 impl Homing {
     /// Begins, with the axis at rest.
-    pub fn begin(
-        now_us: u64,
-        switch_closed: bool,
-        drive: &mut AxisDrive,
-        settings: &Settings,
-    ) -> Self {
-        let mut homing = Self {
-            phase: Phase::Done,
-            same_readings: 0,
+    pub fn begin(switch_closed: bool) -> Self {
+        Self {
+            phase: Phase::Look,
+            same_readings: 1,
             last_reading: switch_closed,
-        };
-        if switch_closed {
-            homing.clear(now_us, drive, settings);
-        } else {
-            homing.phase = Phase::Seek;
-            let axis = drive.axis();
-            // The whole travel, and a tenth more.
-            let travel = i64::from(settings.get(axis, Key::SoftMax))
-                - i64::from(settings.get(axis, Key::HomeAngle));
-            let ramp = drive.ramp(settings, Key::HomeFastSpeed);
-            drive.run(now_us, -drive.steps_of(travel * 11 / 10), ramp);
         }
-        homing
     }
 
     /// Whether this axis is home and at rest.
@@ -87,6 +72,16 @@ impl Homing {
         let steady = self.is_steady(switch_closed);
         let backoff = i64::from(settings.get(drive.axis(), Key::HomeBackoff));
         match self.phase {
+            Phase::Look if steady && switch_closed => self.clear(now_us, drive, settings),
+            Phase::Look if steady => {
+                // The whole travel, and a tenth more.
+                let axis = drive.axis();
+                let travel = i64::from(settings.get(axis, Key::SoftMax))
+                    - i64::from(settings.get(axis, Key::HomeAngle));
+                let ramp = drive.ramp(settings, Key::HomeFastSpeed);
+                drive.run(now_us, -drive.steps_of(travel * 11 / 10), ramp);
+                self.phase = Phase::Seek;
+            }
             Phase::Seek if switch_closed && steady => {
                 drive.decelerate();
                 self.phase = Phase::Stop;

@@ -205,9 +205,14 @@ impl Arms {
                 return Err(error);
             }
         }
-        if self.light.poll(following, FOLLOWER_LIMIT_US)?.is_none() {
-            self.disarm()?;
-            return Ok(Try::Again("the light arm did not see the trigger".into()));
+        match self.light.wait(following, FOLLOWER_LIMIT_US) {
+            Ok(completed) if completed.outcome == Outcome::Done => {}
+            Ok(completed) => return Ok(ended_badly("the trigger", completed.outcome)),
+            Err(LinkError::Endless { .. }) => {
+                self.disarm()?;
+                return Ok(Try::Again("the light arm did not see the trigger".into()));
+            }
+            Err(error) => return Err(error),
         }
         let mut latches = Vec::new();
         for pulse in 0..pulses {
@@ -306,8 +311,7 @@ impl Arms {
                 }
                 other.keep_alive()?;
                 if this.now_us() > deadline_us {
-                    // One last look, which names what does not end.
-                    break Some(this.wait(ticket, 1)?.outcome);
+                    break Some(this.must_have_ended(ticket, limit_us)?.outcome);
                 }
             };
         }

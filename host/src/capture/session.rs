@@ -192,7 +192,9 @@ fn sort_error(index: usize, error: LinkError) -> Result<Try, SessionError> {
                 source: error.into(),
             }),
         },
-        LinkError::NoAnswer { .. } => Ok(Try::Broken(error.to_string())),
+        LinkError::NoAnswer { .. } | LinkError::Endless { .. } => {
+            Ok(Try::Broken(error.to_string()))
+        }
         _ => Err(SessionError::Arms {
             index,
             source: error.into(),

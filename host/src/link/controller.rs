@@ -232,7 +232,20 @@ impl Controller {
 
     /// Waits until something accepted has ended.
     pub fn wait(&mut self, ticket: Ticket, limit_us: u64) -> Result<Completed, LinkError> {
-        self.poll(ticket, limit_us)?.ok_or(LinkError::Endless {
+        match self.poll(ticket, limit_us)? {
+            Some(completed) => Ok(completed),
+            None => self.must_have_ended(ticket, limit_us),
+        }
+    }
+
+    /// After waiting for so long in vain: asks, for the event may be lost.
+    pub fn must_have_ended(
+        &mut self,
+        ticket: Ticket,
+        limit_us: u64,
+    ) -> Result<Completed, LinkError> {
+        self.ask_whether_ended(ticket)?;
+        self.poll(ticket, 0)?.ok_or(LinkError::Endless {
             arm: self.arm.clone(),
             what: ticket.what,
             limit_s: limit_us as f64 * 1e-6,

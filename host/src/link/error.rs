@@ -54,7 +54,7 @@ pub enum LinkError {
         what: &'static str,
     },
     /// Something accepted does not end.
-    #[error("{arm}: {what} did not end within {limit_s:.0} s; stop the arm and look at it")]
+    #[error("{arm}: {what} did not end within {limit_s:.1} s; stop the arm and look at it")]
     Endless {
         /// Which controller.
         arm: String,

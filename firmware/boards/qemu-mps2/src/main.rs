@@ -1,0 +1,135 @@
+//! The arm controller in QEMU.
+//!
+//! What it is: the firmware core on an emulated Cortex-M4F, wired to the simulator's plant instead
+//! of pins. Wire: UART0, log (defmt): UART1. It answers to the light arm's address. Settings live
+//! in RAM and are gone after a restart. QEMU does not keep real time: counts and positions here are
+//! worth looking at, rates are not.
+//!
+//! ```text
+//! qemu-system-arm -M mps2-an386 -display none -monitor none -kernel ELF \
+//!     -serial unix:gonia.sock,server=on,wait=off -serial file:defmt.bin
+//! ```
+#![no_std]
+#![no_main]
+
+mod register;
+mod time;
+mod uart;
+
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::NVIC;
+use cortex_m_rt::exception;
+use embassy_executor::Spawner;
+use embassy_futures::select::{Either, select};
+use embassy_time::{Instant, Timer};
+use gonia_firmware::controller::Controller;
+use gonia_firmware::node::Node;
+use gonia_protocol::message::{Identity, ResetReason};
+use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+use gonia_sim::bench::Bench;
+use gonia_sim::plant::PlantConfig;
+use panic_persist as _;
+use static_cell::StaticCell;
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    static LOG_PORT: StaticCell<uart::LogPort> = StaticCell::new();
+    time::start();
+    uart::start();
+    defmt_serial::defmt_serial(LOG_PORT.init(uart::LogPort));
+    for irq in [time::IRQ, uart::RX_IRQ] {
+        // SAFETY: the handlers share data with tasks only through critical sections.
+        unsafe { NVIC::unmask(Irq(irq)) };
+    }
+    match run_arm() {
+        Ok(task) => spawner.spawn(task),
+        Err(_) => defmt::error!("the arm's task is running already"),
+    }
+}
+
+/// The arm: bytes in, steps and bytes out, and sleep until the next of either.
+#[embassy_executor::task]
+async fn run_arm() {
+    static NODE: StaticCell<Node> = StaticCell::new();
+    static BENCH: StaticCell<Bench> = StaticCell::new();
+    let controller = Controller::new(now_us(), None);
+    let node = NODE.init(Node::new(NODE_LIGHT, identity(), controller));
+    // Not far above the home switches, so that homing takes seconds.
+    let axes = [(-5e6, 3e6), (-190e6, -170e6)];
+    let axes = axes.map(|(home, start)| PlantConfig::worm_axis(home, start));
+    let bench = BENCH.init(Bench::new(axes, 1));
+    defmt::info!("ready");
+    let mut bytes = [0; 64];
+    loop {
+        bench.set_now(now_us());
+        node.poll(now_us(), bench);
+        while let Some(frame) = node.take_frame() {
+            uart::WIRE.send(&frame);
+        }
+        let wake = Timer::at(Instant::from_micros(node.wake_us()));
+        if let Either::First(received) = select(uart::RECEIVED.read(&mut bytes), wake).await {
+            bench.set_now(now_us());
+            for &byte in &bytes[..received] {
+                node.receive(byte, now_us(), bench);
+            }
+        }
+    }
+}
+
+fn identity() -> Identity {
+    let last_panic = panic_persist::get_panic_message_utf8();
+    let reset = match last_panic {
+        Some(_) => ResetReason::Software,
+        None => ResetReason::Unknown,
+    };
+    let last_panic = last_panic.unwrap_or_default();
+    Identity {
+        protocol_min: PROTOCOL_VERSION,
+        protocol_max: PROTOCOL_VERSION,
+        schema_key: SCHEMA_KEY,
+        firmware: gonia_firmware::VERSION,
+        git: gonia_firmware::git_state(),
+        board: "qemu-mps2".try_into().unwrap_or_default(),
+        config_crc: 0,
+        boot_id: next_boot_id(),
+        reset,
+        last_panic: last_panic.chars().filter(char::is_ascii).take(64).collect(),
+    }
+}
+
+/// Counts starts since power came on, in memory that a reset leaves alone.
+fn next_boot_id() -> u32 {
+    #[unsafe(link_section = ".uninit.boots")]
+    static mut BOOTS: core::mem::MaybeUninit<u32> = core::mem::MaybeUninit::uninit();
+    // SAFETY: called once, before anybody else could; any bit pattern is a number.
+    unsafe {
+        let boots = (&raw mut BOOTS).cast::<u32>();
+        boots.write_volatile(boots.read_volatile().wrapping_add(1));
+        boots.read_volatile()
+    }
+}
+
+fn now_us() -> u64 {
+    Instant::now().as_micros()
+}
+
+#[derive(Clone, Copy)]
+struct Irq(u16);
+
+// SAFETY: the numbers used are interrupts of the board.
+unsafe impl InterruptNumber for Irq {
+    fn number(self) -> u16 {
+        self.0
+    }
+}
+
+/// All interrupts come here: without a device crate the vector table has one handler.
+// SAFETY: it touches registers and critical-section data only.
+#[exception]
+unsafe fn DefaultHandler(irq: i16) {
+    match irq as u16 {
+        time::IRQ => time::on_alarm(),
+        uart::RX_IRQ => uart::on_receive(),
+        _ => {}
+    }
+}
