@@ -5,5 +5,6 @@
 pub mod dataset;
 pub mod evaluate;
 pub mod link;
+pub mod process;
 pub mod report;
 pub mod vision;

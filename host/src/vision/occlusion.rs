@@ -1,5 +1,6 @@
 //! What hides the target: Otsu's threshold on the reference's frame, where it makes sense.
 
+use super::ideal_light::IdealLight;
 use super::luminance;
 use super::register::Registration;
 use crate::dataset::{Frame, Rig};
@@ -180,31 +181,6 @@ fn material_pixels(
         }
     }
     (!pixels.is_empty()).then_some(pixels)
-}
-
-/// An ideal point light over the target.
-pub struct IdealLight {
-    at_mm: [f64; 3],
-    distance_mm: f64,
-}
-
-impl IdealLight {
-    /// At a distance from the centre, in a direction.
-    pub fn new(light: Direction, distance_m: f64) -> Self {
-        let distance_mm = distance_m * 1000.0;
-        Self {
-            at_mm: light.to_vec3().map(|c| c * distance_mm),
-            distance_mm,
-        }
-    }
-
-    /// Irradiance cos θi · (d0/d)² at a point of the target (mm), 1 below the light at its distance.
-    pub fn irradiance(&self, at_mm: [f64; 2]) -> f64 {
-        let d = [self.at_mm[0] - at_mm[0], self.at_mm[1] - at_mm[1]];
-        let z = self.at_mm[2];
-        let inverse2 = 1.0 / (d[0] * d[0] + d[1] * d[1] + z * z);
-        z * inverse2.sqrt() * self.distance_mm * self.distance_mm * inverse2
-    }
 }
 
 fn histogram(pixels: &[([u32; 2], f32)], bright: f64) -> [u32; LEVELS] {
