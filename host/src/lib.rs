@@ -7,5 +7,6 @@ pub mod dataset;
 pub mod evaluate;
 pub mod link;
 pub mod plan;
+pub mod process;
 pub mod report;
 pub mod vision;

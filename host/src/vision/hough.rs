@@ -9,6 +9,15 @@ pub struct StripLine {
     pub slope: f64,
 }
 
+impl StripLine {
+    /// The larger of the differences in offset and in slope, pixels.
+    pub fn distance(self, other: Self) -> f64 {
+        (self.offset - other.offset)
+            .abs()
+            .max((self.slope - other.slope).abs())
+    }
+}
+
 /// Finds the strongest bright line within `search_px` of the prediction. Every Sobel edge votes,
 /// with its sign, for the lines through it; a bright line is where a rise is followed, one line's
 /// width further out, by a fall. Each station has the same say, however brightly it is lit.

@@ -4,6 +4,7 @@
 pub mod camera;
 pub mod homography;
 mod hough;
+pub mod ideal_light;
 mod lines;
 pub mod occlusion;
 mod profile;

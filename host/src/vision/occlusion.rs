@@ -1,13 +1,16 @@
 //! What hides the target: Otsu's threshold on the reference's frame, where it makes sense.
 
+use super::ideal_light::IdealLight;
 use super::luminance;
 use super::register::Registration;
 use crate::dataset::{Frame, Rig};
 use gonia_brdf::Direction;
 
-/// The hidden pixels of a frame: a bitmap of the smallest rectangle that holds them.
+/// The hidden parts of a frame: a bitmap of the smallest rectangle that holds them, one bit for a
+/// cell of one pixel, or of several a side in large frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
+    cell: usize,
     left: usize,
     top: usize,
     width: usize,
@@ -18,7 +21,10 @@ pub struct Mask {
 impl Mask {
     /// Whether a pixel is hidden.
     pub fn hides(&self, column: usize, row: usize) -> bool {
-        let (x, y) = (column.wrapping_sub(self.left), row.wrapping_sub(self.top));
+        let (x, y) = (
+            (column / self.cell).wrapping_sub(self.left),
+            (row / self.cell).wrapping_sub(self.top),
+        );
         if x >= self.width || y >= self.height {
             return false;
         }
@@ -26,7 +32,7 @@ impl Mask {
         self.words[bit / 64] >> (bit % 64) & 1 == 1
     }
 
-    /// Number of hidden pixels.
+    /// Number of hidden cells.
     pub fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
     }
@@ -36,10 +42,10 @@ impl Mask {
         self.words.len() * 8
     }
 
-    /// A mask of the pixels within `margin` (in both axes) of the given ones; `None` without any.
-    fn grown(pixels: &[[u32; 2]], margin: usize, size: [usize; 2]) -> Option<Self> {
-        let low = |i: usize| pixels.iter().map(|p| p[i] as usize).min();
-        let high = |i: usize| pixels.iter().map(|p| p[i] as usize).max();
+    /// A mask of the cells within `margin` (in both axes) of the given ones; `None` without any.
+    fn grown(cells: &[[u32; 2]], margin: usize, size: [usize; 2], cell: usize) -> Option<Self> {
+        let low = |i: usize| cells.iter().map(|p| p[i] as usize).min();
+        let high = |i: usize| cells.iter().map(|p| p[i] as usize).max();
         let (left, top) = (
             low(0)?.saturating_sub(margin),
             low(1)?.saturating_sub(margin),
@@ -48,13 +54,14 @@ impl Mask {
         let bottom = (high(1)? + margin + 1).min(size[1]);
         let (width, height) = (right - left, bottom - top);
         let mut mask = Self {
+            cell,
             left,
             top,
             width,
             height,
             words: vec![0; (width * height).div_ceil(64)],
         };
-        for [x, y] in pixels {
+        for [x, y] in cells {
             let (x, y) = (*x as usize - left, *y as usize - top);
             let columns = x.saturating_sub(margin)..(x + margin + 1).min(width);
             for row in y.saturating_sub(margin)..(y + margin + 1).min(height) {
@@ -80,6 +87,8 @@ const VALLEY: [f64; 2] = [0.6, 1.4];
 const SMALL_THRESHOLD: f64 = 0.25;
 /// Growth of the mask for blur and penumbra: this share of the frame's width, at least 2 pixels.
 const MARGIN_WIDTHS: f64 = 0.005;
+/// Frames wider than twice this are looked at in cells of several pixels.
+const CELLS_A_ROW: usize = 400;
 const LEVELS: usize = 256;
 
 /// The mask of what hides the material in a frame of the reference, or `None` when nothing does.
@@ -113,11 +122,18 @@ pub fn find_occlusion(
         .filter(|p| p.1 < threshold)
         .map(|p| p.0)
         .collect();
-    let margin = ((MARGIN_WIDTHS * frame.width as f64).ceil() as usize).max(2);
-    Mask::grown(&hidden, margin, [frame.width, frame.height])
+    let cell = cell_px(frame);
+    let margin = ((MARGIN_WIDTHS * frame.width as f64 / cell as f64).ceil() as usize).max(2);
+    let size = [frame.width, frame.height].map(|n| n.div_ceil(cell));
+    Mask::grown(&hidden, margin, size, cell)
 }
 
-/// The material's pixels with their luminance over an ideal light's; `None` without any.
+/// Side of a cell: what hides the target is far larger than a pixel of a large frame.
+fn cell_px(frame: &Frame) -> usize {
+    (frame.width / CELLS_A_ROW).max(1)
+}
+
+/// The material's cells, each by its middle pixel, with their luminance over an ideal light's; `None` without any.
 fn material_pixels(
     frame: &Frame,
     registration: &Registration,
@@ -142,8 +158,16 @@ fn material_pixels(
     };
     let ideal_light = IdealLight::new(light, rig.light.distance_m);
     let mut pixels = Vec::new();
-    for row in range(1, frame.height) {
-        for column in range(0, frame.width) {
+    let cell = cell_px(frame);
+    // Cells by the pixel in their middle.
+    let middles = |range: std::ops::Range<usize>| {
+        (range.start / cell..range.end.div_ceil(cell)).map(move |i| (i, i * cell + cell / 2))
+    };
+    for (y, row) in middles(range(1, frame.height)) {
+        for (x, column) in middles(range(0, frame.width)) {
+            if column >= frame.width || row >= frame.height {
+                continue;
+            }
             let pixel = [column as f64 + 0.5, row as f64 + 0.5];
             let at = target_from_pixel.apply(registration.camera().undistort(pixel));
             if at[0].abs() > inset[0] || at[1].abs() > inset[1] {
@@ -152,36 +176,11 @@ fn material_pixels(
             let value = luminance(frame.rgb[row * frame.width + column]);
             if value.is_finite() {
                 let relative = value / ideal_light.irradiance(at) as f32;
-                pixels.push(([column as u32, row as u32], relative));
+                pixels.push(([x as u32, y as u32], relative));
             }
         }
     }
     (!pixels.is_empty()).then_some(pixels)
-}
-
-/// An ideal point light over the target.
-pub struct IdealLight {
-    at_mm: [f64; 3],
-    distance_mm: f64,
-}
-
-impl IdealLight {
-    /// At a distance from the centre, in a direction.
-    pub fn new(light: Direction, distance_m: f64) -> Self {
-        let distance_mm = distance_m * 1000.0;
-        Self {
-            at_mm: light.to_vec3().map(|c| c * distance_mm),
-            distance_mm,
-        }
-    }
-
-    /// Irradiance cos θi · (d0/d)² at a point of the target (mm), 1 below the light at its distance.
-    pub fn irradiance(&self, at_mm: [f64; 2]) -> f64 {
-        let d = [self.at_mm[0] - at_mm[0], self.at_mm[1] - at_mm[1]];
-        let z = self.at_mm[2];
-        let inverse2 = 1.0 / (d[0] * d[0] + d[1] * d[1] + z * z);
-        z * inverse2.sqrt() * self.distance_mm * self.distance_mm * inverse2
-    }
 }
 
 fn histogram(pixels: &[([u32; 2], f32)], bright: f64) -> [u32; LEVELS] {
@@ -245,13 +244,13 @@ mod tests {
 
     #[test]
     fn a_mask_hides_what_was_marked_and_its_margin() {
-        let mask = Mask::grown(&[[5, 5], [6, 5]], 2, [20, 20]).unwrap();
+        let mask = Mask::grown(&[[5, 5], [6, 5]], 2, [20, 20], 1).unwrap();
         assert!(mask.hides(3, 3) && mask.hides(8, 7));
         assert!(!mask.hides(9, 5) && !mask.hides(5, 8) && !mask.hides(2, 5));
         assert_eq!(mask.count(), 6 * 5);
-        let corner = Mask::grown(&[[0, 19]], 2, [20, 20]).unwrap();
+        let corner = Mask::grown(&[[0, 19]], 2, [20, 20], 1).unwrap();
         assert!(corner.hides(0, 19) && corner.hides(2, 17) && !corner.hides(0, 16));
-        assert!(Mask::grown(&[], 2, [20, 20]).is_none());
+        assert!(Mask::grown(&[], 2, [20, 20], 1).is_none());
     }
 
     #[test]

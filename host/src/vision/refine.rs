@@ -20,6 +20,10 @@ const SOFT_OUTLIER: f64 = 4.0;
 const MIN_SHARE: f64 = 0.3;
 const MIN_STATIONS: usize = 8;
 
+/// A line that this share of its stations shows at the start needs no other start.
+const PLAINLY_THERE: f64 = 0.9;
+/// Lines closer than this are one, pixels.
+const SAME_LINE_PX: f64 = 0.8;
 /// By how much more of the stations a line far from the prediction must be supported than one close
 /// to it: at grazing views the edge of a bright material resembles a line.
 const CLEARLY_BETTER: f64 = 0.2;
@@ -56,12 +60,10 @@ struct LineSums {
 /// Fits the lines of four strips; each starts at the prediction and at what Hough found, and the
 /// better supported start wins.
 pub fn fit_lines(strips: &[LineStrip; 4], hough: [Option<StripLine>; 4], target: &Target) -> Fit {
-    let mut lines = [StripLine::default(); 4];
-    for (i, strip) in strips.iter().enumerate() {
-        lines[i] = best_start(strip, hough[i], target);
-    }
+    let starts = [0, 1, 2, 3].map(|i| best_start(&strips[i], hough[i], target));
+    let mut lines = starts.each_ref().map(|start| start.0);
+    let mut sums = starts.map(|start| start.1);
     let mut sigma = START_SIGMA_PX;
-    let mut sums = [0, 1, 2, 3].map(|i| sum_line(&strips[i], lines[i], sigma, target));
     for _ in 0..6 {
         let found = sums.each_ref().map(is_found);
         let step = joint_step(&sums, found, sigma);
@@ -75,7 +77,7 @@ pub fn fit_lines(strips: &[LineStrip; 4], hough: [Option<StripLine>; 4], target:
         sigma =
             (sigma * step[8].clamp(-0.4, 0.4).exp()).clamp(SIGMA_RANGE_PX[0], SIGMA_RANGE_PX[1]);
         sums = [0, 1, 2, 3].map(|i| sum_line(&strips[i], lines[i], sigma, target));
-        if largest < 1e-3 && step[8].abs() < 5e-3 {
+        if largest < 2e-3 && step[8].abs() < 1e-2 {
             break;
         }
     }
@@ -96,48 +98,58 @@ fn is_found(sums: &LineSums) -> bool {
     sums.count >= MIN_STATIONS && sums.share >= MIN_SHARE
 }
 
-/// A few steps with the blur held, from either start.
-fn best_start(strip: &LineStrip, hough: Option<StripLine>, target: &Target) -> StripLine {
-    let refine = |mut line: StripLine| {
-        let mut sums = sum_line(strip, line, START_SIGMA_PX, target);
-        for _ in 0..4 {
-            let [a, b, c] = [sums.normal[0][0], sums.normal[0][1], sums.normal[1][1]];
-            let det = a * c - b * b;
-            if det <= 1e-12 * a * c {
-                break;
-            }
-            let step = [
-                (c * sums.right[0] - b * sums.right[1]) / det,
-                (a * sums.right[1] - b * sums.right[0]) / det,
-            ]
-            .map(|d| d.clamp(-1.0, 1.0));
-            line.offset += step[0];
-            line.slope += step[1];
-            sums = sum_line(strip, line, START_SIGMA_PX, target);
-            if step[0].abs().max(step[1].abs()) < 0.02 {
-                break;
-            }
-        }
-        (sums.share, line)
-    };
-    let (share, line) = refine(StripLine::default());
-    // Hough's line, when it is the same one, has nothing to add.
-    match hough {
-        Some(h)
-            if (h.offset - line.offset)
-                .abs()
-                .max((h.slope - line.slope).abs())
-                > 0.8 =>
-        {
-            let (other_share, other) = refine(h);
-            if other_share > share + CLEARLY_BETTER {
-                other
-            } else {
-                line
-            }
-        }
-        _ => line,
+/// Where to start a line: at its prediction if that shows it, else wherever a few steps with the
+/// blur held lead to, from the prediction or from Hough's line, that shows more of it.
+fn best_start(
+    strip: &LineStrip,
+    hough: Option<StripLine>,
+    target: &Target,
+) -> (StripLine, LineSums) {
+    let predicted = StripLine::default();
+    let sums = sum_line(strip, predicted, START_SIGMA_PX, target);
+    if sums.share > PLAINLY_THERE {
+        return (predicted, sums);
     }
+    let near = few_steps(strip, predicted, sums, target);
+    match hough {
+        Some(line) if line.distance(near.0) > SAME_LINE_PX => {
+            let sums = sum_line(strip, line, START_SIGMA_PX, target);
+            let far = few_steps(strip, line, sums, target);
+            if far.1.share > near.1.share + CLEARLY_BETTER {
+                far
+            } else {
+                near
+            }
+        }
+        _ => near,
+    }
+}
+
+fn few_steps(
+    strip: &LineStrip,
+    mut line: StripLine,
+    mut sums: LineSums,
+    target: &Target,
+) -> (StripLine, LineSums) {
+    for _ in 0..4 {
+        let [a, b, c] = [sums.normal[0][0], sums.normal[0][1], sums.normal[1][1]];
+        let det = a * c - b * b;
+        if det <= 1e-12 * a * c {
+            break;
+        }
+        let step = [
+            (c * sums.right[0] - b * sums.right[1]) / det,
+            (a * sums.right[1] - b * sums.right[0]) / det,
+        ]
+        .map(|d| d.clamp(-1.0, 1.0));
+        line.offset += step[0];
+        line.slope += step[1];
+        sums = sum_line(strip, line, START_SIGMA_PX, target);
+        if step[0].abs().max(step[1].abs()) < 0.05 {
+            break;
+        }
+    }
+    (line, sums)
 }
 
 fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> LineSums {

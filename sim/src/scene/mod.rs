@@ -187,7 +187,7 @@ impl<'a> Painter<'a> {
             pose,
             brdf,
             texture,
-            target: TargetMap::new(geometry),
+            target: TargetMap::new(geometry, optics.largest_blur_mm(geometry.desk_half_mm)),
             light: LightField::new(geometry.light_distance_m, pose.light, scene.beam),
             camera_at_m: pose.view.to_vec3().map(|c| c * geometry.camera_distance_m),
             silhouette: scene

@@ -121,7 +121,8 @@ impl Capsule {
         let t =
             ((d[0] * self.along[0] + d[1] * self.along[1]) * self.inverse_length2).clamp(0.0, 1.0);
         let off = [d[0] - t * self.along[0], d[1] - t * self.along[1]];
-        off[0].hypot(off[1]) - (self.radius[0] + t * (self.radius[1] - self.radius[0]))
+        (off[0] * off[0] + off[1] * off[1]).sqrt()
+            - (self.radius[0] + t * (self.radius[1] - self.radius[0]))
     }
 
     fn bounds(&self) -> [[f64; 2]; 2] {

@@ -76,9 +76,19 @@ impl Optics {
         let gradient = |value: f64, row: &Vec3| {
             let du = (row[0] - value * m[2][0]) / w;
             let dv = (row[1] - value * m[2][1]) / w;
-            self.sigma_px * du.hypot(dv)
+            self.sigma_px * (du * du + dv * dv).sqrt()
         };
         [gradient(x / w, &m[0]), gradient(y / w, &m[1])]
+    }
+
+    /// The largest of [`Self::blur_mm`] within a square of the given half side, mm: it grows with
+    /// distance, so that it is at one of the corners.
+    pub fn largest_blur_mm(&self, half_mm: f64) -> f64 {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .iter()
+            .filter_map(|c| self.project([c[0] * half_mm * 1e-3, c[1] * half_mm * 1e-3, 0.0]))
+            .flat_map(|(pixel, _)| self.blur_mm(pixel))
+            .fold(0.0, f64::max)
     }
 
     /// Pixel and pixels per metre at a point of space in front of the camera.

@@ -25,11 +25,16 @@ pub struct TargetMap {
     half_width: f64,
     material_half: f64,
     desk_half: f64,
+    /// Further than this from an edge nothing is blurred, mm.
+    reach: f64,
 }
 
 impl TargetMap {
-    pub fn new(geometry: &SceneGeometry) -> Self {
+    /// For a camera whose blurred aperture has a standard deviation of at most `sigma_max_mm` on
+    /// the desk.
+    pub fn new(geometry: &SceneGeometry, sigma_max_mm: f64) -> Self {
         Self {
+            reach: REACH * sigma_max_mm,
             offset: geometry.line_offset_mm,
             half_width: 0.5 * geometry.line_width_mm,
             material_half: geometry.material_half_mm,
@@ -42,17 +47,16 @@ impl TargetMap {
     /// integrated exactly along each axis. `None` off the desk.
     pub fn paint(&self, at: [f64; 2], sigma_mm: impl Fn() -> [f64; 2]) -> Option<Paint> {
         let far = at[0].abs().max(at[1].abs());
-        // At any sane frame size blur stays far below this: the middle needs no edges.
-        if far < 0.7 * self.material_half {
+        if far < self.material_half - self.reach {
             return Some(Paint {
                 material: 1.0,
                 grey: 0.0,
             });
         }
-        let sigma = sigma_mm();
-        if far > self.desk_half + REACH * sigma[0].max(sigma[1]) {
+        if far > self.desk_half + self.reach {
             return None;
         }
+        let sigma = sigma_mm();
         let within =
             |half: f64| band(at[0], 0.0, half, sigma[0]) * band(at[1], 0.0, half, sigma[1]);
         let line = |axis: usize| band(at[axis].abs(), self.offset, self.half_width, sigma[axis]);
@@ -126,7 +130,7 @@ mod tests {
 
     #[test]
     fn shares_follow_the_layout() {
-        let map = TargetMap::new(&SceneGeometry::paper(400));
+        let map = TargetMap::new(&SceneGeometry::paper(400), 0.5);
         let at = |x, y| map.paint([x, y], || [0.5, 0.5]);
         assert_eq!(at(0.0, 0.0).unwrap().material, 1.0);
         assert!((at(320.0, 0.0).unwrap().material - 0.5).abs() < 1e-6);
