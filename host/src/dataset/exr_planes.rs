@@ -159,9 +159,10 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
         Plane::F16(values) => FlatSamples::F16(values),
         Plane::F32(values) => FlatSamples::F32(values),
     });
-    let mut layer_attributes = LayerAttributes::default();
-    layer_attributes.software_name =
-        Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION")));
+    let mut layer_attributes = LayerAttributes {
+        software_name: Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION"))),
+        ..LayerAttributes::default()
+    };
     for (name, value) in &attributes {
         let texts = Text::new_or_none(name).zip(Text::new_or_none(latin(value)));
         let Some((name, value)) = texts else {

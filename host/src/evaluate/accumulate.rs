@@ -8,6 +8,8 @@ use super::stratum::{Stratum, StratumBits};
 #[derive(Default)]
 pub(super) struct Sums {
     classes: Vec<Option<Box<Class>>>,
+    /// Values of a and of b that no logarithm could be taken of.
+    pub floored: [u64; 2],
 }
 
 /// What one cell contributes.
@@ -36,12 +38,14 @@ struct Class {
     reciprocity_b: f64,
     delta_e: f64,
     delta_e_cells: u64,
-    /// Counts of cosine-weighted errors by the first 16 bits of their f32, the sign left out: 128
-    /// classes an octave.
+    /// Counts of cosine-weighted errors by the first bits of their f32: 64 classes an octave.
     errors: Vec<u64>,
 }
 
-const ERROR_CLASSES: usize = 0x7f80;
+/// Bits of an f32 that do not count for its class.
+const CLASS_SHIFT: u32 = 17;
+/// Classes of all finite positive numbers.
+const ERROR_CLASSES: usize = 0x7f80_0000 >> CLASS_SHIFT;
 
 impl Class {
     fn new() -> Self {
@@ -66,7 +70,7 @@ impl Class {
             self.log += log;
             self.log_squared += log * log;
             self.cos_error += f64::from(cell.cos_error[c]);
-            let class = (cell.cos_error[c].to_bits() >> 16) as usize;
+            let class = (cell.cos_error[c].to_bits() >> CLASS_SHIFT) as usize;
             self.errors[class.min(ERROR_CLASSES - 1)] += 1;
         }
         self.cos_value += f64::from(cell.cos_value);
@@ -107,6 +111,8 @@ impl Sums {
                 self.class(strata as StratumBits).merge(&class);
             }
         }
+        self.floored[0] += other.floored[0];
+        self.floored[1] += other.floored[1];
         self
     }
 
@@ -162,7 +168,7 @@ fn percentile(counts: &[u64], share: f64) -> f64 {
     for (class, count) in counts.iter().enumerate() {
         let count = *count as f64;
         if count > 0.0 && below + count >= target {
-            let edge = |class: usize| f64::from(f32::from_bits((class as u32) << 16));
+            let edge = |class: usize| f64::from(f32::from_bits((class as u32) << CLASS_SHIFT));
             let (from, to) = (edge(class), edge(class + 1).min(f64::from(f32::MAX)));
             return from + (to - from) * (target - below) / count;
         }

@@ -132,8 +132,8 @@ pub fn compare(a: Table<'_>, b: Side<'_>, options: &Options<'_>) -> Result<Figur
         cells_total: scan.cells_total,
         cells_compared,
         cells_colour,
-        floored_a: scan.floored[0],
-        floored_b: scan.floored[1],
+        floored_a: sums.floored[0],
+        floored_b: sums.floored[1],
         factor: pair.is_relative().then_some(f64::from(scan.factor)),
         sphere_delta_e: rendered(render::sphere),
         cylinder_delta_e: rendered(render::cylinder),
@@ -159,13 +159,15 @@ fn picture_delta_e(a: &Picture, b: &Picture) -> f64 {
     sum / count.max(1) as f64
 }
 
-/// Rows and columns that are walked together: a mirrored tile's column is one cache line.
-const TILE: usize = 16;
+/// Rows and columns that are walked together: the tiles of both sides and their mirrors fit into a
+/// core's own cache, and few pages are touched a cell.
+const TILE: usize = 64;
 /// Cells the first look is based on.
 const SCAN_CELLS: usize = 1_000_000;
 
 struct Pair<'a> {
     a: Table<'a>,
+    a_planes: [&'a [f32]; 3],
     b: Side<'a>,
     options: &'a Options<'a>,
     grid: Grid,
@@ -181,8 +183,6 @@ struct Scan {
     highlight: f32,
     /// Least value of each side that a logarithm is taken of, before the factor.
     floor: [f32; 2],
-    /// Values below the floors, of all cells.
-    floored: [u64; 2],
     /// Both sides times this are reflectances a colour can be made of.
     level: f32,
     cells_total: u64,
@@ -205,6 +205,7 @@ impl<'a> Pair<'a> {
         let (directions, theta_deg) = nodes.map(|d| (d.to_vec3(), d.theta_deg())).unzip();
         Ok(Self {
             a,
+            a_planes: planes_of(a.brdf),
             b,
             options,
             grid,
@@ -221,9 +222,13 @@ impl<'a> Pair<'a> {
         matches!(self.b, Side::Table(table) if table.scale == Scale::Relative)
     }
 
+    fn a_at(&self, light: usize, view: usize) -> [f32; 3] {
+        value(&self.a_planes, self.grid.cell(light, view))
+    }
+
     fn b_at(&self, light: usize, view: usize) -> [f32; 3] {
         match self.b {
-            Side::Table(table) => table.brdf.at(light, view),
+            Side::Table(table) => value(&planes_of(table.brdf), self.grid.cell(light, view)),
             Side::Model(model) => model
                 .eval(self.directions[light], self.directions[view])
                 .map(|v| v as f32),
@@ -274,7 +279,7 @@ impl<'a> Pair<'a> {
             .par_iter()
             .map(|cell| {
                 let (light, view) = self.grid.light_and_view(*cell);
-                (self.a.brdf.at(light, view), self.b_at(light, view))
+                (self.a_at(light, view), self.b_at(light, view))
             })
             .collect();
 
@@ -324,31 +329,9 @@ impl<'a> Pair<'a> {
             factor,
             highlight: quantile(&mut weighted, 0.99).unwrap_or(f32::INFINITY),
             floor,
-            floored: self.floored(floor),
             level,
             cells_total,
         })
-    }
-
-    /// Values at or below the floors over all cells that are compared.
-    fn floored(&self, floor: [f32; 2]) -> [u64; 2] {
-        let count = |table: &DenseBrdf, floor: f32| {
-            let stride = self.stride_of_cells();
-            table
-                .planes()
-                .par_iter()
-                .map(|plane| {
-                    let low =
-                        |(cell, value): &(usize, &f32)| **value <= floor && self.wanted(*cell);
-                    plane.iter().enumerate().step_by(stride).filter(low).count() as u64
-                })
-                .sum()
-        };
-        let b = match self.b {
-            Side::Table(table) => count(table.brdf, floor[1]),
-            Side::Model(_) => 0,
-        };
-        [count(self.a.brdf, floor[0]), b]
     }
 
     fn stride_of_cells(&self) -> usize {
@@ -370,8 +353,8 @@ impl<'a> Pair<'a> {
                     for light in lights.clone() {
                         for view in first_view..n.min(first_view + TILE) {
                             let cell = self.grid.cell(light, view);
-                            if cell % stride == 0 && self.wanted(cell) {
-                                let colour = cell % colour_stride == 0;
+                            if cell.is_multiple_of(stride) && self.wanted(cell) {
+                                let colour = cell.is_multiple_of(colour_stride);
                                 self.add(&mut sums, scan, light, view, colour);
                             }
                         }
@@ -384,14 +367,18 @@ impl<'a> Pair<'a> {
 
     fn add(&self, sums: &mut Sums, scan: &Scan, light: usize, view: usize, colour: bool) {
         let floor = [scan.floor[0] * scan.factor, scan.floor[1]];
-        let a = self.a.brdf.at(light, view).map(|v| v * scan.factor);
+        let a = self.a_at(light, view).map(|v| v * scan.factor);
         let b = self.b_at(light, view);
         let cosines = self.cosines(light, view);
+        for c in 0..3 {
+            sums.floored[0] += u64::from(a[c] <= floor[0]);
+            sums.floored[1] += u64::from(b[c] <= floor[1]);
+        }
         let log = [0, 1, 2].map(|c| (a[c].max(floor[0]) / b[c].max(floor[1])).ln());
 
-        let a_mirror = self.a.brdf.at(view, light).map(|v| v * scan.factor);
+        let a_mirror = self.a_at(view, light).map(|v| v * scan.factor);
         let reciprocity_b = match self.b {
-            Side::Table(table) => log_distance(b, table.brdf.at(view, light), floor[1]),
+            Side::Table(_) => log_distance(b, self.b_at(view, light), floor[1]),
             Side::Model(_) => 0.0,
         };
 
@@ -416,6 +403,16 @@ impl<'a> Pair<'a> {
             },
         );
     }
+}
+
+fn planes_of(brdf: &DenseBrdf) -> [&[f32]; 3] {
+    let [r, g, b] = brdf.planes();
+    [r, g, b]
+}
+
+#[inline]
+fn value(planes: &[&[f32]; 3], cell: usize) -> [f32; 3] {
+    [planes[0][cell], planes[1][cell], planes[2][cell]]
 }
 
 /// Sum over the channels of ln(f/g)².

@@ -1,1 +1,53 @@
 //! Pictures and the HTML report.
+//!
+//! [`write_report`] draws one self-contained file from a [`ReportInput`]: a summary, which is also
+//! kept as `summary.toml`, and the dense BRDF. So a report can be drawn again from a folder.
+
+mod charts;
+mod color_map;
+mod html;
+mod panels;
+pub mod png;
+mod shots;
+mod slices;
+mod svg;
+pub mod tone;
+
+use crate::dataset::whole_file::write_whole_bytes;
+use crate::dataset::{CellMask, FileError, Summary};
+use gonia_brdf::{Brdf, DenseBrdf};
+use std::path::Path;
+
+/// What a report is drawn from.
+#[derive(Clone, Copy)]
+pub struct ReportInput<'a> {
+    /// The numbers.
+    pub summary: &'a Summary,
+    /// The measured BRDF.
+    pub dense: &'a DenseBrdf,
+    /// The true one, where it is known; drawn beside the measured one, with their difference.
+    pub truth: Option<&'a dyn Brdf>,
+    /// The cells that hold a measurement, where that is known.
+    pub measured: Option<&'a CellMask>,
+}
+
+/// Writes the report whole: one HTML file that needs no other file and no network.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_report(path: &Path, input: &ReportInput<'_>) -> Result<(), FileError> {
+    write_whole_bytes(path, html::page(input).into_string().as_bytes())
+}
+
+/// Writes the picture of the lit sphere alone, as a PNG of `px` × `px` pixels (for a README).
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_sphere(path: &Path, brdf: &dyn Brdf, px: usize) -> Result<(), FileError> {
+    let picture = crate::evaluate::render::sphere(brdf, &crate::evaluate::render::studio(), px, 2);
+    let exposure = shots::exposure(&picture);
+    write_whole_bytes(
+        path,
+        &png::rgba(&tone::picture_rgba(&picture, exposure), px, px),
+    )
+}

@@ -1,0 +1,103 @@
+//! The lit sphere and the draped cylinder, measured and true, for the page.
+
+use super::{color_map, png, tone};
+use crate::evaluate::Tabulated;
+use crate::evaluate::color::{delta_e, luminance};
+use crate::evaluate::render::{self, Light, Picture};
+use gonia_brdf::{Brdf, DenseBrdf};
+
+/// Pixels a side.
+pub const PX: usize = 448;
+
+/// One object, as images for the page.
+pub struct Shots {
+    /// What it is.
+    pub name: &'static str,
+    /// The measured BRDF on it.
+    pub measured: String,
+    /// The true one, and their colour difference, where the truth is known.
+    pub beside_truth: Option<(String, String)>,
+}
+
+/// Largest ΔE2000 of the difference pictures' scale.
+pub const DELTA_E_SCALE: f32 = 10.0;
+
+/// The factor that shows a picture well: all but its brightest highlights below white.
+pub fn exposure(picture: &Picture) -> f32 {
+    picture.exposure(0.985, 0.82)
+}
+
+/// Draws sphere and cylinder.
+pub fn draw(dense: &DenseBrdf, factor: f64, truth: Option<&dyn Brdf>) -> Vec<Shots> {
+    let lights = render::studio();
+    let measured = Tabulated::scaled(dense, factor);
+    type Shape = fn(&dyn Brdf, &[Light], usize, usize) -> Picture;
+    let shapes: [(&'static str, Shape); 2] = [
+        ("Sphere", render::sphere),
+        ("Draped cylinder", render::cylinder),
+    ];
+    shapes
+        .into_iter()
+        .map(|(name, shape)| {
+            let shot = shape(&measured, &lights, PX, 1);
+            let true_shot = truth.map(|truth| shape(truth, &lights, PX, 1));
+            let exposure = exposure(true_shot.as_ref().unwrap_or(&shot));
+            Shots {
+                name,
+                measured: uri(&tone::picture_rgba(&smooth_edge(&shot), exposure)),
+                beside_truth: true_shot.map(|truth| {
+                    (
+                        uri(&tone::picture_rgba(&smooth_edge(&truth), exposure)),
+                        uri(&difference(&shot, &truth, exposure)),
+                    )
+                }),
+            }
+        })
+        .collect()
+}
+
+fn uri(pixels: &[[u8; 4]]) -> String {
+    png::data_uri(&png::rgba(pixels, PX, PX))
+}
+
+/// ΔE2000 of what the screen shows, as colours.
+fn difference(a: &Picture, b: &Picture, exposure: f32) -> Vec<[u8; 4]> {
+    let shown = |rgb: [f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));
+    (0..a.rgb.len())
+        .map(|k| {
+            let [r, g, b_] =
+                color_map::sequential(delta_e(shown(a.rgb[k]), shown(b.rgb[k])) / DELTA_E_SCALE);
+            [r, g, b_, (255.0 * a.cover[k]) as u8]
+        })
+        .collect()
+}
+
+/// A picture of one point a pixel with its outline smoothed: cheaper than four points everywhere.
+fn smooth_edge(picture: &Picture) -> Picture {
+    let (w, h) = (picture.width, picture.height);
+    let mut smooth = picture.clone();
+    let inside = |x: usize, y: usize| picture.cover[y * w + x] > 0.0;
+    for y in 1..h - 1 {
+        for x in 1..w - 1 {
+            let block = (0..9).map(|k| (x + k % 3 - 1, y + k / 3 - 1));
+            let near: Vec<[f32; 3]> = block
+                .filter(|(x, y)| inside(*x, *y))
+                .map(|(x, y)| picture.rgb[y * w + x])
+                .collect();
+            if near.is_empty() || near.len() == 9 {
+                continue;
+            }
+            let at = y * w + x;
+            smooth.cover[at] = near.len() as f32 / 9.0;
+            if !inside(x, y) {
+                // The colour beyond the outline is that of the darkest point next to it.
+                let darkest = near
+                    .iter()
+                    .copied()
+                    .min_by(|a, b| luminance(*a).total_cmp(&luminance(*b)));
+                smooth.rgb[at] = darkest.unwrap_or_default();
+            }
+        }
+    }
+    smooth
+}
