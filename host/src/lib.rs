@@ -2,7 +2,9 @@
 //!
 //! Data flows one way: `plan → poses → [link → arms] → frames → registration → samples →
 //! compensation → bins → interpolation → dense BRDF → EXR, pictures, report`.
+pub mod camera;
 pub mod capture;
+pub mod cli;
 pub mod dataset;
 pub mod evaluate;
 pub mod link;

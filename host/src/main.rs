@@ -1,2 +1,5 @@
-//! The command line.
-fn main() {}
+//! `gonia`: see `gonia --help`.
+
+fn main() -> std::process::ExitCode {
+    gonia::cli::run()
+}

@@ -3,6 +3,8 @@
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [--step 2] [--patch 4] [--nodes 128]`
 
+#![allow(clippy::expect_used)]
+
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate::{Settings, fill, select};

@@ -1,7 +1,9 @@
 //! A BRDF on every cell of the grid.
 
-use crate::direction::{Direction, wrap_deg};
+use crate::direction::{Direction, Vec3, wrap_deg};
 use crate::grid::Grid;
+use crate::model::Brdf;
+use rayon::prelude::*;
 
 /// A BRDF tabulated on a [`Grid`]: three planes, one a colour channel, each `n_cells` long in the
 /// order of [`Grid::cell`] (row = light, column = view).
@@ -18,6 +20,27 @@ impl DenseBrdf {
             .iter()
             .all(|p| p.len() == grid.n_cells())
             .then_some(Self { grid, planes })
+    }
+
+    /// The table of an analytic model.
+    pub fn tabulate(grid: Grid, model: &dyn Brdf) -> Self {
+        let n = grid.n_directions();
+        let vectors: Vec<Vec3> = (0..n).map(|d| grid.direction(d).to_vec3()).collect();
+        let mut planes = [(); 3].map(|()| vec![0.0; grid.n_cells()]);
+        let [red, green, blue] = &mut planes;
+        red.par_chunks_mut(n)
+            .zip(green.par_chunks_mut(n))
+            .zip(blue.par_chunks_mut(n))
+            .enumerate()
+            .for_each(|(light, ((red, green), blue))| {
+                for view in 0..n {
+                    let value = model.eval(vectors[light], vectors[view]);
+                    red[view] = value[0] as f32;
+                    green[view] = value[1] as f32;
+                    blue[view] = value[2] as f32;
+                }
+            });
+        Self { grid, planes }
     }
 
     /// Wraps planes that are known to be of the grid's size.

@@ -10,10 +10,16 @@ const STRETCH: usize = 3;
 const GAIN: f64 = 1e-9;
 
 /// The order in which to visit all directions, starting at the first one.
+///
+/// The path will be travelled forwards and backwards, so a step counts the mean of both ways; 2-opt
+/// needs that symmetry too, or it might never end.
 pub fn shortest_path(directions: &[Direction], time: MoveTime) -> Vec<usize> {
     let n = directions.len();
+    let both_ways = |a: usize, b: usize| {
+        0.5 * (time(directions[a], directions[b]) + time(directions[b], directions[a]))
+    };
     let times: Vec<Vec<f64>> = (0..n)
-        .map(|a| (0..n).map(|b| time(directions[a], directions[b])).collect())
+        .map(|a| (0..n).map(|b| both_ways(a, b)).collect())
         .collect();
     let mut path = nearest_neighbours(&times);
     while reverse_a_stretch(&mut path, &times) || move_a_stretch(&mut path, &times) {}

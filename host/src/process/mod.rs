@@ -14,9 +14,9 @@ mod tests;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
 pub use compensation::Compensation;
-pub use source::{FrameRow, FrameSource, LoadError, Role};
+pub use source::{FrameRow, FrameSource, Role};
 
-use crate::dataset::{Frame, Rig};
+use crate::dataset::{FileError, Frame, Rig};
 use crate::vision::ideal_light::IdealLight;
 use crate::vision::occlusion::find_occlusion;
 use crate::vision::{PointValue, Registrar, Registration, SamplingGrid};
@@ -76,14 +76,12 @@ pub enum ProcessError {
         rows: usize,
     },
     /// A frame could not be read.
-    #[error("frame {frame} ({file}): {source}")]
+    #[error("frame {frame}: {source}")]
     Load {
         /// Its number.
         frame: u32,
-        /// Its file.
-        file: String,
-        /// What went wrong.
-        source: LoadError,
+        /// What is wrong, and with which file.
+        source: FileError,
     },
     /// A frame is not of the size that the rig's camera has.
     #[error(
@@ -226,7 +224,6 @@ impl<'a> Bench<'a> {
     fn load(&self, row: &FrameRow) -> Result<Frame, ProcessError> {
         let frame = self.source.load(row).map_err(|source| ProcessError::Load {
             frame: row.frame,
-            file: row.file.clone(),
             source,
         })?;
         let camera = &self.rig.camera;

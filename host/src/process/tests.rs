@@ -1,6 +1,7 @@
 //! The whole chain from frames to samples against the simulator's truth.
 
 use super::*;
+use crate::dataset::FileError;
 use crate::dataset::rig::Reference;
 use crate::vision::simulated::{pose, render, rig, scene};
 use gonia_brdf::Brdf;
@@ -44,7 +45,7 @@ impl FrameSource for Rendered {
         &self.rows
     }
 
-    fn load(&self, row: &FrameRow) -> Result<Frame, LoadError> {
+    fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
         let which = match row.role {
             Role::Material => Surface::Material,
             Role::Reference => Surface::Reference,

@@ -112,8 +112,7 @@ fn factor_panel<S: Simd>(simd: S, panel: &mut [f32], rows: usize, j: usize, firs
             }
         }
         let diagonal = column[j + c];
-        // Written so that NaN fails too.
-        if !(diagonal > 0.0) {
+        if diagonal.is_nan() || diagonal <= 0.0 {
             return false;
         }
         let scale = simd.splat_f32s(1.0 / diagonal.sqrt());

@@ -49,7 +49,7 @@ pub fn select(bins: &Bins, base: Settings) -> Selection {
     if let Some(variance) = log_noise_variance(bins.bins().iter()) {
         settings.noise_variance = variance;
     }
-    let held_out = |bin: &&Bin| hash(bin.frame) % HOLD_OUT == 0;
+    let held_out = |bin: &&Bin| hash(bin.frame).is_multiple_of(HOLD_OUT);
     let known = |bin: &&Bin| bin.frame != Sample::NO_FRAME;
     let candidates: Vec<&Bin> = bins.bins().iter().filter(known).filter(held_out).collect();
     let tests: Vec<&Bin> = candidates

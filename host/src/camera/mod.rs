@@ -1,0 +1,5 @@
+//! Cameras.
+
+pub mod simulated;
+
+pub use simulated::SimulatedCamera;

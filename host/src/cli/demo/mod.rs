@@ -1,0 +1,179 @@
+//! `gonia demo`: a whole measurement on the simulated rig. The arms' controllers run the real
+//! firmware core behind the real wire, in virtual time; every frame goes through the real chain.
+
+mod session;
+mod summary;
+
+use super::fill::{self, How, fill};
+use super::plan::travelling;
+use super::process;
+use super::progress::Progress;
+use crate::camera::SimulatedCamera;
+use crate::camera::simulated::geometry_of;
+use crate::dataset::dense_exr::write_dense;
+use crate::dataset::frames_csv::write_frames_csv;
+use crate::dataset::plan_csv::write_plan_csv;
+use crate::dataset::rig_toml::write_rig;
+use crate::dataset::samples::write_samples;
+use crate::dataset::{CellMask, DenseFile, Rig, Scale, cell_mask, check_writable};
+use crate::evaluate::compare::Table;
+use crate::evaluate::{self, Options, Side, Tabulated};
+use crate::plan::Rings;
+use crate::process::FrameSource;
+use crate::report::{ReportInput, write_report, write_sphere};
+use anyhow::{Result, bail};
+use gonia_brdf::DenseBrdf;
+use gonia_brdf::interpolate::Settings;
+use gonia_brdf::model::Kurt;
+use gonia_sim::scene::Scene;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Measures a two-thread fabric of known BRDF on the simulated rig.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia demo --quick\n  gonia demo --out fabric --frame-px 600\n\nThe whole plan has 8505 poses of the material and as many of the reference, and takes minutes;\n--quick has 925, a grid of 4 degrees, and keeps its frames, so that `gonia process` can be tried\non them."
+)]
+pub struct Demo {
+    /// Fewer poses and a coarser grid, in less than a minute
+    #[arg(long)]
+    quick: bool,
+    /// Folder for all that is written
+    #[arg(long, value_name = "DIR", default_value = "gonia-demo")]
+    out: PathBuf,
+    /// Side of a frame in pixels [default: 400, quick: 240]
+    #[arg(long, value_name = "PX")]
+    frame_px: Option<usize>,
+    /// Keep the frames as a capture folder (the whole plan's take 16 GB)
+    #[arg(long)]
+    keep_frames: bool,
+    /// Seed of all that is random in the simulation
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Demo {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let began = Instant::now();
+        let (rings, step, frame_px) = if self.quick {
+            (Rings::quick(), 4.0, 240)
+        } else {
+            (Rings::paper(), 2.0, 400)
+        };
+        let frame_px = self.frame_px.unwrap_or(frame_px);
+        if !(100..=8192).contains(&frame_px) {
+            bail!("--frame-px {frame_px}: must lie in 100..=8192");
+        }
+        let keep_frames = self.keep_frames || self.quick;
+        let (grid, settings) = How {
+            step,
+            block: None,
+            nodes: Settings::DEFAULT.nodes,
+        }
+        .check()?;
+        check_writable(&self.out)?;
+        let path = |name: &str| self.out.join(name);
+        let mut progress = Progress::new();
+
+        let rig = Rig::paper(frame_px);
+        write_rig(&path("rig.toml"), &rig)?;
+        let plan = travelling(&rings);
+        write_plan_csv(&path("plan.csv"), &plan.poses)?;
+
+        let truth = Arc::new(Kurt::two_thread_fabric());
+        let mut camera = SimulatedCamera::new(Scene::new(
+            geometry_of(&rig),
+            truth.clone(),
+            Arc::new(Kurt::white_reference_fabric()),
+            self.seed,
+        ));
+        if keep_frames {
+            camera.keep_frames(&self.out)?;
+        }
+        let session = progress.stage("moving and triggering", |tell| {
+            session::measure(&plan.poses, self.seed, &mut camera, tell)
+        })?;
+        if keep_frames {
+            write_frames_csv(&path("frames.csv"), camera.rows())?;
+        }
+
+        let mut processed = process::run(&rig, &camera, &mut progress)?;
+        progress.stage("writing samples", |_| {
+            write_samples(&path("samples.npy"), &processed.samples)
+        })?;
+        let samples = std::mem::take(&mut processed.samples);
+        let filled = fill(samples, grid, settings, &mut progress)?;
+        let mut summary = summary::start(&session, &processed, plan.poses.len());
+        summary
+            .provenance
+            .extend(fill::provenance_of(&filled.settings));
+        for (name, text) in [
+            ("seed", self.seed.to_string()),
+            ("rig", format!("simulated, frames of {frame_px} px")),
+            ("plan", format!("{} poses", plan.poses.len())),
+        ] {
+            summary.provenance.insert(name.into(), text);
+        }
+
+        let measured = CellMask::from_cells(grid, filled.cells.iter().map(|c| *c as usize));
+        cell_mask::write_mask(&path("bins.npy"), &measured)?;
+        summary::count_cells(&mut summary, filled.binned as u64, &measured);
+        let dense = progress.stage("writing the dense BRDF", |_| {
+            write_dense(
+                &path("dense.exr"),
+                DenseFile {
+                    brdf: filled.dense,
+                    scale: summary.scale,
+                    provenance: summary.provenance.clone(),
+                },
+            )
+        })?;
+        summary.figures = Some(progress.stage("measuring the error", |_| {
+            evaluate::compare(
+                Table {
+                    brdf: &dense.brdf,
+                    scale: dense.scale,
+                },
+                Side::Model(truth.as_ref()),
+                &Options::default(),
+            )
+        })?);
+        progress.stage("writing the truth", |_| {
+            write_dense(
+                &path("truth.exr"),
+                DenseFile {
+                    brdf: DenseBrdf::tabulate(grid, truth.as_ref()),
+                    scale: Scale::Absolute,
+                    provenance: super::provenance::of_this_program(),
+                },
+            )
+        })?;
+        summary.stages = progress.stages().to_vec();
+        summary::list_files(&mut summary, &self.out);
+        progress.stage("drawing the report", |_| {
+            let sphere = Tabulated::new(&dense.brdf);
+            write_sphere(&path("sphere.png"), &sphere, 512)?;
+            write_report(
+                &path("report.html"),
+                &ReportInput {
+                    summary: &summary,
+                    dense: &dense.brdf,
+                    truth: Some(truth.as_ref()),
+                    measured: Some(&measured),
+                },
+            )
+        })?;
+        summary.stages = progress.stages().to_vec();
+        summary::list_files(&mut summary, &self.out);
+        summary.write(&path("summary.toml"))?;
+        summary::print(
+            &summary,
+            &session,
+            &processed,
+            began.elapsed().as_secs_f64(),
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,176 @@
+//! `gonia fill`: samples → bins → dense BRDF.
+
+use super::progress::Progress;
+use super::provenance::{Provenance, of_this_program};
+use super::table;
+use crate::dataset::dense_exr::write_dense;
+use crate::dataset::samples::read_samples;
+use crate::dataset::{DenseFile, Scale, check_writable};
+use anyhow::{Context, Result, bail};
+use gonia_brdf::interpolate::{self, Settings};
+use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
+use std::path::{Path, PathBuf};
+
+/// Interpolates samples to every cell of the grid.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame."
+)]
+pub struct Fill {
+    /// Samples, .npy or .csv
+    samples: PathBuf,
+    /// The dense BRDF to write (OpenEXR)
+    #[arg(short, long, value_name = "DENSE.exr")]
+    output: PathBuf,
+    #[command(flatten)]
+    how: How,
+    /// What the samples' values are: relative, or absolute (1/sr)
+    #[arg(long, value_enum, default_value = "relative")]
+    scale: ScaleArgument,
+}
+
+/// How to interpolate.
+#[derive(clap::Args, Clone, Copy)]
+pub struct How {
+    /// Step of the grid in degrees
+    #[arg(long, default_value_t = 2.0, value_name = "DEG")]
+    pub step: f64,
+    /// Size of the blocks that share a factorisation, degrees [default: 4, or twice the step]
+    #[arg(long, value_name = "DEG")]
+    pub block: Option<f64>,
+    /// Neighbours a block
+    #[arg(long, default_value_t = Settings::DEFAULT.nodes, value_name = "N")]
+    pub nodes: usize,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy)]
+enum ScaleArgument {
+    Relative,
+    Absolute,
+}
+
+impl How {
+    /// Grid and starting settings; one line when they make no sense.
+    pub fn check(&self) -> Result<(Grid, Settings)> {
+        let grid = Grid::with_step_deg(self.step).context("--step")?;
+        let patch_deg = self.block.unwrap_or(f64::max(4.0, 2.0 * self.step));
+        if !(self.step..=45.0).contains(&patch_deg) {
+            bail!(
+                "--block {patch_deg}: must lie between the step ({}) and 45 degrees",
+                self.step
+            );
+        }
+        if !(8..=1024).contains(&self.nodes) {
+            bail!("--nodes {}: must lie in 8..=1024", self.nodes);
+        }
+        let settings = Settings {
+            patch_deg,
+            nodes: self.nodes,
+            ..Settings::DEFAULT
+        };
+        Ok((grid, settings))
+    }
+}
+
+/// What filling gave, beside the values.
+pub struct Filled {
+    /// The values.
+    pub dense: DenseBrdf,
+    /// Cells with a sample, by number.
+    pub cells: Vec<u32>,
+    /// Samples that fell into a bin.
+    pub binned: usize,
+    /// Samples outside the grid.
+    pub outside: usize,
+    /// The settings, as chosen for the material.
+    pub settings: Settings,
+}
+
+/// Bins samples (and drops them), chooses the settings, and interpolates.
+pub fn fill(
+    samples: Vec<Sample>,
+    grid: Grid,
+    base: Settings,
+    progress: &mut Progress,
+) -> Result<Filled> {
+    let total = samples.len();
+    let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
+    drop(samples);
+    let selection = progress.stage("choosing settings", |_| {
+        anyhow::Ok(interpolate::select(&bins, base))
+    })?;
+    let dense = progress.stage("interpolating", |tell| {
+        interpolate::fill(&bins, &selection.settings, tell)
+    })?;
+    Ok(Filled {
+        dense,
+        cells: bins.bins().iter().map(|b| b.cell).collect(),
+        binned: total - bins.outside(),
+        outside: bins.outside(),
+        settings: selection.settings,
+    })
+}
+
+impl Fill {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let (grid, base) = self.how.check()?;
+        check_writable(folder_of(&self.output))?;
+        let mut progress = Progress::new();
+        let samples = progress.stage("reading samples", |_| read_samples(&self.samples))?;
+        let filled = fill(samples, grid, base, &mut progress)
+            .with_context(|| self.samples.display().to_string())?;
+        let file = DenseFile {
+            brdf: filled.dense,
+            scale: match self.scale {
+                ScaleArgument::Relative => Scale::Relative,
+                ScaleArgument::Absolute => Scale::Absolute,
+            },
+            provenance: {
+                let mut facts = provenance_of(&filled.settings);
+                facts.insert("samples".into(), self.samples.display().to_string());
+                facts
+            },
+        };
+        progress.stage("writing the dense BRDF", |_| {
+            write_dense(&self.output, file)
+        })?;
+        let mut rows = vec![
+            (
+                "samples binned".to_owned(),
+                table::count(filled.binned as u64),
+            ),
+            (
+                "samples outside the grid".into(),
+                table::count(filled.outside as u64),
+            ),
+            (
+                "bins filled".into(),
+                table::count(filled.cells.len() as u64),
+            ),
+            ("cells".into(), table::count(grid.n_cells() as u64)),
+            ("settings".into(), filled.settings.to_string()),
+            ("written".into(), self.output.display().to_string()),
+        ];
+        for stage in progress.stages() {
+            rows.push((stage.name.clone(), format!("{:.1} s", stage.seconds)));
+        }
+        table::print(&rows);
+        Ok(())
+    }
+}
+
+/// What a filled BRDF says of its making.
+pub fn provenance_of(settings: &Settings) -> Provenance {
+    let mut facts = of_this_program();
+    facts.insert("interpolation".into(), settings.to_string());
+    facts
+}
+
+/// The folder a file will be in.
+pub fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}

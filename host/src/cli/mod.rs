@@ -1,0 +1,101 @@
+//! The command line. Each command is one file; all end with exit code 0, with 1 after one line
+//! that says what is wrong and what to do, or with 2 for wrong usage.
+
+mod compare;
+mod demo;
+mod fill;
+mod plan;
+mod process;
+mod progress;
+mod provenance;
+mod query;
+mod report;
+mod table;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Measures dense anisotropic BRDFs with a gonioreflectometer.
+#[derive(Parser)]
+#[command(name = "gonia", version, about, max_term_width = 100)]
+struct Cli {
+    /// Threads to compute with [default: all processors]
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Measure a material on the simulated rig: arms, frames, bins, dense BRDF, report
+    Demo(demo::Demo),
+    /// Dry run: poses in travelling order, limits checked, time and disk estimated
+    Plan(plan::Plan),
+    /// Frames of a capture folder → samples
+    Process(process::Process),
+    /// Samples → bins → dense BRDF
+    Fill(fill::Fill),
+    /// Values of a dense BRDF at directions read from standard input
+    Query(query::Query),
+    /// How far one dense BRDF is from another, by stratum
+    Compare(compare::Compare),
+    /// One HTML file with pictures and figures of a measurement
+    Report(report::Report),
+}
+
+/// Runs the command that the arguments name.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    match start(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gonia: {}", one_line(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start(cli: Cli) -> anyhow::Result<()> {
+    if let Some(threads) = cli.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.get())
+            .build_global()?;
+    }
+    match cli.command {
+        Command::Demo(command) => command.run(),
+        Command::Plan(command) => command.run(),
+        Command::Process(command) => command.run(),
+        Command::Fill(command) => command.run(),
+        Command::Query(command) => command.run(),
+        Command::Compare(command) => command.run(),
+        Command::Report(command) => command.run(),
+    }
+}
+
+/// The whole chain of causes on one line.
+fn one_line(error: &anyhow::Error) -> String {
+    format!("{error:#}")
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn every_command_has_help_with_an_example() {
+        let mut command = Cli::command();
+        command.build();
+        for sub in command.get_subcommands_mut() {
+            if sub.get_name() == "help" {
+                continue;
+            }
+            let help = sub.render_long_help().to_string();
+            assert!(help.contains("Example"), "{}", sub.get_name());
+        }
+    }
+}

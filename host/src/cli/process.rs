@@ -1,0 +1,155 @@
+//! `gonia process`: frames → samples.
+
+use super::progress::Progress;
+use super::table;
+use crate::dataset::samples::write_samples;
+use crate::dataset::summary::{FrameCounts, Refused};
+use crate::dataset::{CaptureFolder, Rig, Role, Scale, check_writable};
+use crate::process::{self, Compensation, FrameSource, Outcome, Processed, Stage};
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Registers each frame from its marks, samples it, and compensates by the reference.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig."
+)]
+pub struct Process {
+    /// The capture folder
+    folder: PathBuf,
+    /// Where to write the samples, .npy or .csv [default: DIR/samples.npy]
+    #[arg(short, long, value_name = "SAMPLES")]
+    output: Option<PathBuf>,
+}
+
+impl Process {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let folder = CaptureFolder::open(&self.folder)?;
+        let output = self
+            .output
+            .unwrap_or_else(|| self.folder.join("samples.npy"));
+        check_writable(super::fill::folder_of(&output))?;
+        let mut progress = Progress::new();
+        let processed = run(folder.rig(), &folder, &mut progress)?;
+        progress.stage("writing samples", |_| {
+            write_samples(&output, &processed.samples)
+        })?;
+        let mut rows = describe(&processed);
+        rows.push(("written".into(), output.display().to_string()));
+        table::print(&rows);
+        Ok(())
+    }
+}
+
+/// The chain from frames to samples, with a bar.
+pub fn run(rig: &Rig, source: &dyn FrameSource, progress: &mut Progress) -> Result<Processed> {
+    let of_role = |role| source.rows().iter().filter(|row| row.role == role).count();
+    let reference = of_role(Role::Reference);
+    let total = source.rows().len().max(1);
+    Ok(progress.stage("frames to samples", |tell| {
+        process::process(rig, source, &|stage, done, _| {
+            let before = match stage {
+                Stage::Reference => 0,
+                Stage::Material => reference,
+            };
+            tell((before + done) as f64 / total as f64);
+        })
+    })?)
+}
+
+/// Whether the samples are in 1/sr.
+pub fn scale_of(processed: &Processed) -> Scale {
+    if processed.compensation.is_absolute() {
+        Scale::Absolute
+    } else {
+        Scale::Relative
+    }
+}
+
+/// Frames used, and frames refused by reason.
+pub fn frame_counts(processed: &Processed) -> FrameCounts {
+    let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
+    let mut kept = 0;
+    for frame in &processed.frames {
+        match frame.outcome {
+            Outcome::Refused(refusal) => {
+                // Numbers in a reason would make every frame a reason of its own.
+                let words = refusal
+                    .to_string()
+                    .replace(|c: char| c.is_ascii_digit(), "#");
+                *reasons.entry(words).or_default() += 1;
+            }
+            Outcome::Locked | Outcome::FellBack(_) => kept += 1,
+        }
+    }
+    FrameCounts {
+        kept,
+        refused: reasons
+            .into_iter()
+            .map(|(reason, count)| Refused { reason, count })
+            .collect(),
+    }
+}
+
+/// What came of the frames, for the table.
+pub fn describe(processed: &Processed) -> Vec<(String, String)> {
+    let counts = frame_counts(processed);
+    let by_pose = processed
+        .frames
+        .iter()
+        .filter(|frame| matches!(frame.outcome, Outcome::FellBack(_)))
+        .count();
+    let offsets = &processed.offsets;
+    let left_out = &processed.left_out;
+    let mut rows = vec![
+        (
+            "frames".to_owned(),
+            format!(
+                "{} kept ({} of them by their pose, marks hidden), {} refused",
+                table::count(counts.kept),
+                table::count(by_pose as u64),
+                table::count(counts.n_refused())
+            ),
+        ),
+        (
+            "camera by the marks".into(),
+            format!(
+                "theta {:+.4} ± {:.4}, phi {:+.4} ± {:.4} degrees from the arm's reading",
+                offsets.theta_mean_deg,
+                offsets.theta_sd_deg,
+                offsets.phi_mean_deg,
+                offsets.phi_sd_deg
+            ),
+        ),
+        (
+            "compensation".into(),
+            match processed.compensation {
+                Compensation::KnownReference => "by the known reference, absolute (1/sr)",
+                Compensation::UnknownReference => "by the unknown reference, eq. (3), relative",
+                Compensation::GeometricModel => "none: ideal light over the geometry, relative",
+            }
+            .to_owned(),
+        ),
+        (
+            "samples".into(),
+            format!(
+                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} not finite)",
+                table::count(processed.samples.len() as u64),
+                table::count(left_out.total()),
+                table::count(left_out.occlusion),
+                table::count(left_out.dark_reference + left_out.below_horizon),
+                table::count(left_out.mark + left_out.border),
+                table::count(left_out.not_finite)
+            ),
+        ),
+    ];
+    for refused in counts.refused {
+        rows.push((
+            format!("refused, {}", table::count(refused.count)),
+            refused.reason,
+        ));
+    }
+    rows
+}
