@@ -195,7 +195,8 @@ impl Controller {
         if self.state != State::Armed || !follows {
             return;
         }
-        self.latch(now_us, hardware);
+        let outside = self.axis_outside_window(now_us, hardware);
+        self.latch(now_us, outside.is_none());
         if let Some(train) = &self.train
             && train.is_over()
         {
@@ -584,7 +585,7 @@ impl Controller {
                     self.complete(Outcome::LeftWindow(axis));
                 }
                 None => {
-                    self.latch(now_us, hardware);
+                    self.latch(now_us, true);
                     hardware.set_trigger(true);
                 }
             },
@@ -598,8 +599,8 @@ impl Controller {
         }
     }
 
-    fn latch(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        let within = self.axis_outside_window(now_us, hardware).is_none();
+    /// Keeps the encoders that were read just now.
+    fn latch(&mut self, now_us: u64, within: bool) {
         let seq = self.next_seq();
         let encoder_udeg = [self.drives[0].encoder_udeg(), self.drives[1].encoder_udeg()];
         let Some(train) = &mut self.train else { return };
