@@ -216,4 +216,33 @@ mod tests {
         );
         assert_eq!(error.lines().count(), 1);
     }
+
+    #[test]
+    #[ignore = "a measurement: the paper's grid, 753 MB on disk and in memory"]
+    fn the_papers_grid_is_written_and_read_in_seconds() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("dense.exr");
+        let grid = Grid::PAPER;
+        let planes = [1, 2, 3].map(|c| (0..grid.n_cells()).map(|k| (c * k) as f32).collect());
+        let brdf = DenseBrdf::new(grid, planes).unwrap();
+        let provenance = BTreeMap::new();
+        let start = std::time::Instant::now();
+        write_dense(
+            &path,
+            DenseFile {
+                brdf,
+                scale: Scale::Absolute,
+                provenance,
+            },
+        )
+        .unwrap();
+        println!("write: {:?}", start.elapsed());
+        let start = std::time::Instant::now();
+        let file = read_dense(&path).unwrap();
+        println!("read: {:?}", start.elapsed());
+        assert_eq!(
+            file.brdf.at(7919, 7919)[1],
+            (2 * (grid.n_cells() - 1)) as f32
+        );
+    }
 }

@@ -6,9 +6,9 @@ use maud::{Markup, html};
 
 /// A histogram of the pointing errors, with the limit and the 99th percentile marked.
 pub fn pointing(pointing: &Pointing) -> Markup {
-    const W: f64 = 520.0;
-    const H: f64 = 210.0;
-    const LEFT: f64 = 52.0;
+    const W: f64 = 380.0;
+    const H: f64 = 230.0;
+    const LEFT: f64 = 46.0;
     const RIGHT: f64 = 14.0;
     const TOP: f64 = 26.0;
     const BOTTOM: f64 = 42.0;
@@ -46,10 +46,10 @@ pub fn pointing(pointing: &Pointing) -> Markup {
 
 /// Seconds by stage as bars.
 pub fn stages(stages: &[Stage]) -> Markup {
-    const W: f64 = 520.0;
+    const W: f64 = 380.0;
     const ROW: f64 = 24.0;
-    const LEFT: f64 = 150.0;
-    const RIGHT: f64 = 74.0;
+    const LEFT: f64 = 104.0;
+    const RIGHT: f64 = 88.0;
     let longest = stages
         .iter()
         .map(|stage| stage.seconds)
@@ -136,11 +136,7 @@ pub fn seconds(value: f64) -> String {
     } else if value < 120.0 {
         format!("{value:.1} s")
     } else {
-        format!(
-            "{} min {:02.0} s",
-            (value / 60.0) as u64,
-            (value % 60.0).floor()
-        )
+        format!("{}:{:02} min", (value / 60.0) as u64, (value % 60.0) as u64)
     }
 }
 
@@ -156,8 +152,8 @@ mod tests {
     fn numbers_read_as_people_write_them() {
         assert_eq!(thousands(62_726_400), "62\u{202f}726\u{202f}400");
         assert_eq!(thousands(999), "999");
-        assert_eq!(seconds(3.14159), "3.14 s");
-        assert_eq!(seconds(187.9), "3 min 07 s");
+        assert_eq!(seconds(4.567), "4.57 s");
+        assert_eq!(seconds(187.9), "3:07 min");
         assert_eq!(trimmed(0.03), "0.03");
     }
 

@@ -168,9 +168,10 @@ fn renders(input: &ReportInput<'_>) -> Markup {
         div class=(class) {
             @for shot in &drawn {
                 (picture(&shot.measured, shot.name, "measured"))
-                @if let Some((truth, difference)) = &shot.beside_truth {
-                    (picture(truth, shot.name, "true"))
-                    (picture(difference, shot.name, &format!("difference, dark 0 to bright ΔE {}", shots::DELTA_E_SCALE)))
+                @if let Some(beside) = &shot.beside_truth {
+                    (picture(&beside.truth, shot.name, "true"))
+                    (picture(&beside.difference, shot.name,
+                        &format!("difference, bright is ΔE {}", beside.brightest_delta_e)))
                 }
             }
         }
@@ -263,7 +264,7 @@ fn figures_table(figures: &Figures) -> Markup {
 
 fn session_charts(summary: &Summary, grid: Grid) -> Markup {
     html! {
-        div.pair {
+        div.charts {
             @if let Some(pointing) = &summary.pointing {
                 section {
                     h2 { "Pointing" }

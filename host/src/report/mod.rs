@@ -5,6 +5,7 @@
 
 mod charts;
 mod color_map;
+pub mod folder;
 mod html;
 mod panels;
 pub mod png;
@@ -12,6 +13,8 @@ mod shots;
 mod slices;
 mod svg;
 pub mod tone;
+
+pub use folder::report_folder;
 
 use crate::dataset::whole_file::write_whole_bytes;
 use crate::dataset::{CellMask, FileError, Summary};

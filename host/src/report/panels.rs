@@ -123,7 +123,7 @@ fn panel<T>(
             @let along = degrees / 360.0 * SIDE;
             (svg::line(x + along, y + SIDE, x + along, y + SIDE + 3.0, "tick"))
             (svg::line(x - 3.0, y + SIDE - along, x, y + SIDE - along, "tick"))
-            @if last_row && degrees % 180.0 == 0.0 {
+            @if last_row && degrees < 360.0 && degrees % 90.0 == 0.0 {
                 (svg::text(x + along, y + SIDE + 13.0, "middle", "small", &format!("{degrees}°")))
             }
             @if first_column && degrees % 90.0 == 0.0 {

@@ -1,6 +1,6 @@
 //! The lit sphere and the draped cylinder, measured and true, for the page.
 
-use super::{color_map, png, tone};
+use super::{color_map, png, svg, tone};
 use crate::evaluate::Tabulated;
 use crate::evaluate::color::{delta_e, luminance};
 use crate::evaluate::render::{self, Light, Picture};
@@ -16,11 +16,18 @@ pub struct Shots {
     /// The measured BRDF on it.
     pub measured: String,
     /// The true one, and their colour difference, where the truth is known.
-    pub beside_truth: Option<(String, String)>,
+    pub beside_truth: Option<BesideTruth>,
 }
 
-/// Largest ΔE2000 of the difference pictures' scale.
-pub const DELTA_E_SCALE: f32 = 10.0;
+/// The pictures that need the truth.
+pub struct BesideTruth {
+    /// The true BRDF on the object.
+    pub truth: String,
+    /// Where the two differ.
+    pub difference: String,
+    /// The ΔE2000 that is brightest in the difference.
+    pub brightest_delta_e: f64,
+}
 
 /// The factor that shows a picture well: all but its brightest highlights below white.
 pub fn exposure(picture: &Picture) -> f32 {
@@ -46,10 +53,13 @@ pub fn draw(dense: &DenseBrdf, factor: f64, truth: Option<&dyn Brdf>) -> Vec<Sho
                 name,
                 measured: uri(&tone::picture_rgba(&smooth_edge(&shot), exposure)),
                 beside_truth: true_shot.map(|truth| {
-                    (
-                        uri(&tone::picture_rgba(&smooth_edge(&truth), exposure)),
-                        uri(&difference(&shot, &truth, exposure)),
-                    )
+                    let delta_e = differences(&shot, &truth, exposure);
+                    let brightest = brightest_of(&delta_e);
+                    BesideTruth {
+                        truth: uri(&tone::picture_rgba(&smooth_edge(&truth), exposure)),
+                        difference: uri(&difference_rgba(&delta_e, &shot.cover, brightest)),
+                        brightest_delta_e: brightest,
+                    }
                 }),
             }
         })
@@ -60,16 +70,34 @@ fn uri(pixels: &[[u8; 4]]) -> String {
     png::data_uri(&png::rgba(pixels, PX, PX))
 }
 
-/// ΔE2000 of what the screen shows, as colours.
-fn difference(a: &Picture, b: &Picture, exposure: f32) -> Vec<[u8; 4]> {
-    let shown = |rgb: [f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));
-    (0..a.rgb.len())
-        .map(|k| {
-            let [r, g, b_] =
-                color_map::sequential(delta_e(shown(a.rgb[k]), shown(b.rgb[k])) / DELTA_E_SCALE);
-            [r, g, b_, (255.0 * a.cover[k]) as u8]
-        })
+/// ΔE2000 of what the screen shows, pixel by pixel.
+fn differences(a: &Picture, b: &Picture, exposure: f32) -> Vec<f32> {
+    let shown = |rgb: &[f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));
+    a.rgb
+        .iter()
+        .zip(&b.rgb)
+        .map(|(a, b)| delta_e(shown(a), shown(b)))
         .collect()
+}
+
+/// A round number that nearly all differences stay below, at least 2: what differs less cannot
+/// be seen and shall not look alarming.
+fn brightest_of(delta_e: &[f32]) -> f64 {
+    let mut sorted: Vec<f32> = delta_e.iter().copied().filter(|d| *d > 0.0).collect();
+    sorted.sort_by(f32::total_cmp);
+    let high = sorted
+        .get(sorted.len() * 995 / 1000)
+        .copied()
+        .unwrap_or(0.0);
+    svg::round_up(f64::from(high).max(2.0))
+}
+
+fn difference_rgba(delta_e: &[f32], cover: &[f32], brightest: f64) -> Vec<[u8; 4]> {
+    let pixel = |(delta_e, cover): (&f32, &f32)| {
+        let [r, g, b] = color_map::sequential(delta_e / brightest as f32);
+        [r, g, b, (255.0 * cover) as u8]
+    };
+    delta_e.iter().zip(cover).map(pixel).collect()
 }
 
 /// A picture of one point a pixel with its outline smoothed: cheaper than four points everywhere.

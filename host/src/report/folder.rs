@@ -1,0 +1,130 @@
+//! The report of a folder that a run left behind.
+
+use super::{ReportInput, write_report};
+use crate::dataset::cell_mask::read_mask;
+use crate::dataset::dense_exr::read_dense;
+use crate::dataset::{FileError, Summary};
+use crate::evaluate::Tabulated;
+use gonia_brdf::Brdf;
+use std::path::{Path, PathBuf};
+
+/// What a run writes into its folder, and the report is drawn from.
+pub const SUMMARY: &str = "summary.toml";
+/// The dense BRDF; the only file that must be there.
+pub const DENSE: &str = "dense.exr";
+/// The true BRDF as a table of the same grid.
+pub const TRUTH: &str = "truth.exr";
+/// The cells that hold a measurement, see [`crate::dataset::CellMask`].
+pub const MEASURED: &str = "measured.npy";
+/// The report.
+pub const REPORT: &str = "report.html";
+
+/// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there
+/// `summary.toml`, `measured.npy` and `truth.exr`. Returns its path.
+///
+/// # Errors
+/// One line naming the file: no dense BRDF, a file that cannot be used, a truth of another grid, or
+/// the report cannot be written.
+pub fn report_folder(folder: &Path) -> Result<PathBuf, FileError> {
+    let file = read_dense(&folder.join(DENSE))?;
+    let summary_path = folder.join(SUMMARY);
+    let summary = if summary_path.exists() {
+        Summary::read(&summary_path)?
+    } else {
+        let name = folder.canonicalize().ok();
+        let name = name
+            .as_deref()
+            .and_then(Path::file_name)
+            .map(|name| name.to_string_lossy());
+        let mut summary = Summary::new(name.unwrap_or("A BRDF".into()), file.scale);
+        summary.provenance = file.provenance;
+        summary
+    };
+    let measured_path = folder.join(MEASURED);
+    let measured = match measured_path.exists() {
+        true => Some(read_mask(&measured_path, file.brdf.grid())?),
+        false => None,
+    };
+    let truth_path = folder.join(TRUTH);
+    let truth = match truth_path.exists() {
+        true => Some(read_dense(&truth_path)?.brdf),
+        false => None,
+    };
+    if truth
+        .as_ref()
+        .is_some_and(|truth| truth.grid() != file.brdf.grid())
+    {
+        return Err(FileError::new(
+            &truth_path,
+            format_args!("is of another grid than {DENSE}"),
+            "remove it, or make it again with the same steps",
+        ));
+    }
+    let truth = truth.as_ref().map(Tabulated::new);
+    let report = folder.join(REPORT);
+    write_report(
+        &report,
+        &ReportInput {
+            summary: &summary,
+            dense: &file.brdf,
+            truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
+            measured: measured.as_ref(),
+        },
+    )?;
+    Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::cell_mask::write_mask;
+    use crate::dataset::dense_exr::write_dense;
+    use crate::dataset::{CellMask, DenseFile, Scale};
+    use gonia_brdf::{DenseBrdf, Grid};
+
+    fn flat(step_deg: f64, value: f32) -> DenseFile {
+        let grid = Grid::with_step_deg(step_deg).unwrap();
+        let brdf = DenseBrdf::new(grid, [0, 1, 2].map(|_| vec![value; grid.n_cells()])).unwrap();
+        DenseFile {
+            brdf,
+            scale: Scale::Absolute,
+            provenance: [("seed".into(), "7".into())].into(),
+        }
+    }
+
+    #[test]
+    fn a_folder_with_nothing_but_a_dense_brdf_has_a_report() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = report_folder(dir.path()).unwrap_err().to_string();
+        assert!(
+            error.contains("dense.exr") && error.ends_with("check the path"),
+            "{error}"
+        );
+
+        write_dense(&dir.path().join(DENSE), flat(30.0, 0.3)).unwrap();
+        let report = report_folder(dir.path()).unwrap();
+        let text = std::fs::read_to_string(report).unwrap();
+        assert!(text.contains("values in 1/sr") && text.contains("seed"));
+        assert!(!text.contains("Measured against true"));
+    }
+
+    #[test]
+    fn truth_mask_and_summary_are_used_where_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let dense = flat(30.0, 0.3);
+        let grid = dense.brdf.grid();
+        write_dense(&dir.path().join(DENSE), dense).unwrap();
+        write_dense(&dir.path().join(TRUTH), flat(30.0, 0.31)).unwrap();
+        write_mask(&dir.path().join(MEASURED), &CellMask::from_cells(grid, [5])).unwrap();
+        Summary::new("silk", Scale::Absolute)
+            .write(&dir.path().join(SUMMARY))
+            .unwrap();
+        let text = std::fs::read_to_string(report_folder(dir.path()).unwrap()).unwrap();
+        assert!(text.contains("<h1>silk</h1>") && text.contains("Measured against true"));
+        assert!(text.contains("Measured bins"));
+
+        write_dense(&dir.path().join(TRUTH), flat(15.0, 0.31)).unwrap();
+        let error = report_folder(dir.path()).unwrap_err().to_string();
+        assert!(error.contains("truth.exr: is of another grid"), "{error}");
+    }
+}
