@@ -20,6 +20,7 @@ use crate::evaluate::compare::Table;
 use crate::evaluate::{self, Options, Side, Tabulated};
 use crate::plan::Rings;
 use crate::process::FrameSource;
+use crate::report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use crate::report::{ReportInput, write_report, write_sphere};
 use anyhow::{Result, bail};
 use gonia_brdf::DenseBrdf;
@@ -99,13 +100,13 @@ impl Demo {
             write_frames_csv(&path("frames.csv"), camera.rows())?;
         }
 
-        let mut processed = process::run(&rig, &camera, &mut progress)?;
+        let processed = process::run(&rig, &camera, &mut progress)?;
         progress.stage("writing samples", |_| {
             write_samples(&path("samples.npy"), &processed.samples)
         })?;
-        let samples = std::mem::take(&mut processed.samples);
-        let filled = fill(samples, grid, settings, &mut progress)?;
+        let frame_rows = process::describe(&processed);
         let mut summary = summary::start(&session, &processed, plan.poses.len());
+        let filled = fill(processed.samples, grid, settings, &mut progress)?;
         summary
             .provenance
             .extend(fill::provenance_of(&filled.settings));
@@ -118,11 +119,11 @@ impl Demo {
         }
 
         let measured = CellMask::from_cells(grid, filled.cells.iter().map(|c| *c as usize));
-        cell_mask::write_mask(&path("bins.npy"), &measured)?;
+        cell_mask::write_mask(&path(MEASURED), &measured)?;
         summary::count_cells(&mut summary, filled.binned as u64, &measured);
         let dense = progress.stage("writing the dense BRDF", |_| {
             write_dense(
-                &path("dense.exr"),
+                &path(DENSE),
                 DenseFile {
                     brdf: filled.dense,
                     scale: summary.scale,
@@ -142,7 +143,7 @@ impl Demo {
         })?);
         progress.stage("writing the truth", |_| {
             write_dense(
-                &path("truth.exr"),
+                &path(TRUTH),
                 DenseFile {
                     brdf: DenseBrdf::tabulate(grid, truth.as_ref()),
                     scale: Scale::Absolute,
@@ -156,7 +157,7 @@ impl Demo {
             let sphere = Tabulated::new(&dense.brdf);
             write_sphere(&path("sphere.png"), &sphere, 512)?;
             write_report(
-                &path("report.html"),
+                &path(REPORT),
                 &ReportInput {
                     summary: &summary,
                     dense: &dense.brdf,
@@ -167,11 +168,11 @@ impl Demo {
         })?;
         summary.stages = progress.stages().to_vec();
         summary::list_files(&mut summary, &self.out);
-        summary.write(&path("summary.toml"))?;
+        summary.write(&path(SUMMARY))?;
         summary::print(
             &summary,
             &session,
-            &processed,
+            &frame_rows,
             began.elapsed().as_secs_f64(),
         );
         Ok(())

@@ -5,24 +5,25 @@ use crate::cli::{process, table};
 use crate::dataset::summary::{BinCounts, CellCounts, FileNote, PoseCounts};
 use crate::dataset::{CellMask, Summary};
 use crate::process::Processed;
+use crate::report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use gonia_brdf::Grid;
 use std::path::Path;
 
 /// What each file of a demo holds.
 const FILES: [(&str, &str); 10] = [
-    ("report.html", "the report"),
+    (REPORT, "the report"),
     ("sphere.png", "the material on a sphere"),
-    ("dense.exr", "the dense BRDF"),
-    ("truth.exr", "the true BRDF on the same grid"),
+    (DENSE, "the dense BRDF"),
+    (TRUTH, "the true BRDF on the same grid"),
     (
         "samples.npy",
         "samples: theta_i, phi_i, theta_v, phi_v, r, g, b, frame",
     ),
-    ("bins.npy", "one bit a cell: which ones hold a sample"),
+    (MEASURED, "one bit a cell: which ones hold a sample"),
     ("plan.csv", "the poses in travelling order"),
     ("rig.toml", "the rig"),
     ("frames.csv", "the frames, if kept"),
-    ("summary.toml", "these figures"),
+    (SUMMARY, "these figures"),
 ];
 
 /// The part of the summary that is known before interpolation.
@@ -91,7 +92,7 @@ pub fn list_files(summary: &mut Summary, folder: &Path) {
 }
 
 /// Prints the table at the demo's end.
-pub fn print(summary: &Summary, session: &Session, processed: &Processed, seconds: f64) {
+pub fn print(summary: &Summary, session: &Session, frame_rows: &[(String, String)], seconds: f64) {
     let mut rows = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
     if let Some(poses) = summary.poses {
@@ -123,8 +124,8 @@ pub fn print(summary: &Summary, session: &Session, processed: &Processed, second
             ),
         );
     }
-    for (name, value) in process::describe(processed) {
-        row(&name, value);
+    for (name, value) in frame_rows {
+        row(name, value.clone());
     }
     if let (Some(bins), Some(cells)) = (&summary.bins, summary.cells) {
         row(
