@@ -6,7 +6,7 @@ use crate::dataset::samples::write_samples;
 use crate::dataset::summary::{FrameCounts, Refused};
 use crate::dataset::{CaptureFolder, Rig, Role, Scale, check_writable};
 use crate::process::{self, Compensation, FrameSource, Outcome, Processed, Stage};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -48,7 +48,7 @@ pub fn run(rig: &Rig, source: &dyn FrameSource, progress: &mut Progress) -> Resu
     let of_role = |role| source.rows().iter().filter(|row| row.role == role).count();
     let reference = of_role(Role::Reference);
     let total = source.rows().len().max(1);
-    Ok(progress.stage("frames to samples", |tell| {
+    let processed = progress.stage("frames to samples", |tell| {
         process::process(rig, source, &|stage, done, _| {
             let before = match stage {
                 Stage::Reference => 0,
@@ -56,7 +56,19 @@ pub fn run(rig: &Rig, source: &dyn FrameSource, progress: &mut Progress) -> Resu
             };
             tell((before + done) as f64 / total as f64);
         })
-    })?)
+    })?;
+    if processed.samples.is_empty() {
+        let why = frame_counts(&processed)
+            .refused
+            .into_iter()
+            .max_by_key(|refused| refused.count)
+            .map_or("every point was left out".to_owned(), |r| r.reason);
+        bail!(
+            "none of the {} frames gave a sample: {why}; check rig.toml and the poses",
+            source.rows().len()
+        );
+    }
+    Ok(processed)
 }
 
 /// Whether the samples are in 1/sr.
