@@ -11,6 +11,9 @@ use super::lines::RunSample;
 /// How far the fit's window goes past an edge, in standard deviations of the blur, plus a pixel.
 const WINDOW_SIGMAS: f64 = 3.0;
 
+/// How far it goes into the material, likewise.
+const MATERIAL_SIGMAS: f64 = 1.5;
+
 /// Width of line and gap at a station, pixels.
 #[derive(Clone, Copy)]
 pub struct Profile {
@@ -47,8 +50,9 @@ impl Profile {
         // A gap wide enough to stand in keeps the material out of it.
         let clear = self.edge - WINDOW_SIGMAS * self.sigma;
         let with_material = clear < self.half_width + margin;
+        // Little of the material: it may have a pattern of its own.
         let inner = if with_material {
-            self.edge + margin
+            self.edge + MATERIAL_SIGMAS * self.sigma + 1.0
         } else {
             outer
         };
