@@ -31,8 +31,9 @@ const LINE_FLOOR_PX: f64 = 0.003;
 const MISFIT_WIDTHS: f64 = 6e-4;
 /// Nothing is believed of a frame in which fewer lines are seen.
 const MIN_LINES: usize = 3;
-/// Sum of squared standard deviations (of fourteen numbers) above which something is wrong.
-const MAX_SURPRISE: f64 = 60.0;
+/// Sum of squared standard deviations (of fourteen numbers with six unknowns; 8 is usual) above
+/// which something is wrong.
+const MAX_SURPRISE: f64 = 25.0;
 /// Nor are lines that want roll, shift or magnification this many standard deviations off.
 const MAX_DEVIATION: f64 = 6.0;
 /// Standard deviation of an arm that does not hold its 0.03°.
@@ -236,7 +237,9 @@ impl Registrar {
     ) -> Result<Solution, (Reason, Fit)> {
         let width = self.camera.size_px[0] as f64;
         let fits = estimate.misfit_px <= (MISFIT_WIDTHS * width).max(0.2)
-            && estimate.camera_deviation <= MAX_DEVIATION;
+            && estimate.camera_deviation <= MAX_DEVIATION
+            // Three lines may not overrule the rig.
+            && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
         if !fits {
             return Err((estimate.wrong_layout(), fit));
         }
@@ -276,16 +279,17 @@ impl Registrar {
         if arm_off.surprise <= MAX_SURPRISE {
             return arm_off;
         }
-        if arm_off.lines_used > MIN_LINES {
-            let without = (0..4).map(|i| {
-                let mut rest = *lines;
-                rest[i] = None;
-                self.estimate(view, strips, &rest, &self.trust(ARM_DEG))
-            });
-            let best = without.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
-            if let Some(best) = best.filter(|e| e.surprise <= MAX_SURPRISE) {
-                return best;
-            }
+        if arm_off.lines_used == MIN_LINES {
+            return arm_off;
+        }
+        let without = (0..4).map(|i| {
+            let mut rest = *lines;
+            rest[i] = None;
+            self.estimate(view, strips, &rest, &self.trust(ARM_DEG))
+        });
+        let best = without.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        if let Some(best) = best.filter(|e| e.surprise <= MAX_SURPRISE) {
+            return best;
         }
         let mut trust = self.trust(LOOSE_ARM_DEG);
         trust.model_px = trust.model_px.max(arm_off.misfit_px);
