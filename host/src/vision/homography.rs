@@ -115,7 +115,7 @@ mod tests {
         let from = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         let map = Homography::from_corners(&from, &to).unwrap();
         let jacobian = map.jacobian([0.3, -0.2]);
-        for axis in 0..2 {
+        for (axis, column) in jacobian.iter().enumerate() {
             let step = |h: f64| {
                 let mut p = [0.3, -0.2];
                 p[axis] += h;
@@ -123,7 +123,7 @@ mod tests {
             };
             for i in 0..2 {
                 let numeric = (step(1e-5)[i] - step(-1e-5)[i]) / 2e-5;
-                assert!((jacobian[axis][i] - numeric).abs() < 1e-5);
+                assert!((column[i] - numeric).abs() < 1e-5);
             }
         }
     }

@@ -116,10 +116,11 @@ fn fit_rows(rows: &[Row], with_material: bool) -> Option<StationFit> {
     let mut gram = [[0.0; 3]; 3];
     let mut right = [0.0; 3];
     for row in rows {
-        for i in 0..unknowns {
-            right[i] += row.basis[i] * row.value;
-            for j in 0..unknowns {
-                gram[i][j] += row.basis[i] * row.basis[j];
+        // Without material its basis is zero, and so are its products.
+        for (i, basis) in row.basis.iter().enumerate() {
+            right[i] += basis * row.value;
+            for (sum, other) in gram[i].iter_mut().zip(row.basis) {
+                *sum += basis * other;
             }
         }
     }

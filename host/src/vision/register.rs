@@ -165,14 +165,14 @@ impl Registrar {
                 state: State::Locked,
                 camera: self.camera.clone(),
             },
-            Err((reason, fit)) => Registration {
+            Err(failure) => Registration {
                 pixel_from_target: predicted,
-                residual_px: scatter(&fit),
+                residual_px: failure.scatter_px,
                 pose_offset: PoseOffset::default(),
                 view: reading.view,
-                blur_px: fit.sigma_px,
-                lines_found: fit.lines.iter().flatten().count(),
-                state: State::FellBack(reason),
+                blur_px: failure.blur_px,
+                lines_found: failure.lines_found,
+                state: State::FellBack(failure.reason),
                 camera: self.camera.clone(),
             },
         }
@@ -183,7 +183,7 @@ impl Registrar {
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
-    ) -> Result<Solution, (Reason, Fit)> {
+    ) -> Result<Solution, Failure> {
         let search_px = SEARCH_WIDTHS * frame.width as f64 + 4.0;
         let strips = SIDES.map(|side| {
             LineStrip::cut(
@@ -217,11 +217,11 @@ impl Registrar {
         view: Direction,
         strips: &[LineStrip; 4],
         hough: [Option<StripLine>; 4],
-    ) -> Result<Solution, (Reason, Fit)> {
+    ) -> Result<Solution, Failure> {
         let fit = fit_lines(strips, &Starts::Around(hough), &self.target);
         let found = fit.lines.iter().flatten().count();
         if found < MIN_LINES {
-            return Err((Reason::LinesMissing { found }, fit));
+            return Err(Failure::new(Reason::LinesMissing { found }, &fit));
         }
         let estimate = self.best_estimate(view, strips, &fit.lines);
         self.settle(view, strips, fit, estimate)
@@ -234,22 +234,22 @@ impl Registrar {
         strips: &[LineStrip; 4],
         fit: Fit,
         estimate: Estimate,
-    ) -> Result<Solution, (Reason, Fit)> {
+    ) -> Result<Solution, Failure> {
         let width = self.camera.size_px[0] as f64;
         let fits = estimate.misfit_px <= (MISFIT_WIDTHS * width).max(0.2)
             && estimate.camera_deviation <= MAX_DEVIATION
             // Three lines may not overrule the rig.
             && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
         if !fits {
-            return Err((estimate.wrong_layout(), fit));
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
         }
         let shift = estimate.shift;
         let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
         if offset_deg > MAX_OFFSET_DEG {
-            return Err((Reason::FarFromPose { offset_deg }, fit));
+            return Err(Failure::new(Reason::FarFromPose { offset_deg }, &fit));
         }
         let Some(homography) = self.homography(strips, &estimate.lines) else {
-            return Err((estimate.wrong_layout(), fit));
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
         };
         let furthest_px = estimate.lines.iter().map(|l| l.abs()).fold(0.0, f64::max);
         Ok(Solution {
@@ -441,6 +441,25 @@ struct Solution {
     blur_px: f64,
     lines_found: usize,
     furthest_px: f64,
+}
+
+/// Why there is no solution, and what was seen nevertheless.
+struct Failure {
+    reason: Reason,
+    scatter_px: f64,
+    blur_px: f64,
+    lines_found: usize,
+}
+
+impl Failure {
+    fn new(reason: Reason, fit: &Fit) -> Self {
+        Self {
+            reason,
+            scatter_px: scatter(fit),
+            blur_px: fit.sigma_px,
+            lines_found: fit.lines.iter().flatten().count(),
+        }
+    }
 }
 
 struct Estimate {
