@@ -121,9 +121,10 @@ mod tests {
                 p[axis] += h;
                 map.apply(p)
             };
-            for i in 0..2 {
-                let numeric = (step(1e-5)[i] - step(-1e-5)[i]) / 2e-5;
-                assert!((column[i] - numeric).abs() < 1e-5);
+            let (ahead, behind) = (step(1e-5), step(-1e-5));
+            for (i, derivative) in column.iter().enumerate() {
+                let numeric = (ahead[i] - behind[i]) / 2e-5;
+                assert!((derivative - numeric).abs() < 1e-5);
             }
         }
     }
