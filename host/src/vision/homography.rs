@@ -115,15 +115,16 @@ mod tests {
         let from = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         let map = Homography::from_corners(&from, &to).unwrap();
         let jacobian = map.jacobian([0.3, -0.2]);
-        for axis in 0..2 {
+        for (axis, column) in jacobian.iter().enumerate() {
             let step = |h: f64| {
                 let mut p = [0.3, -0.2];
                 p[axis] += h;
                 map.apply(p)
             };
-            for i in 0..2 {
-                let numeric = (step(1e-5)[i] - step(-1e-5)[i]) / 2e-5;
-                assert!((jacobian[axis][i] - numeric).abs() < 1e-5);
+            let (ahead, behind) = (step(1e-5), step(-1e-5));
+            for (i, derivative) in column.iter().enumerate() {
+                let numeric = (ahead[i] - behind[i]) / 2e-5;
+                assert!((derivative - numeric).abs() < 1e-5);
             }
         }
     }

@@ -14,6 +14,8 @@ pub mod register;
 mod register_tests;
 pub mod sampling;
 #[cfg(test)]
+mod sampling_tests;
+#[cfg(test)]
 pub(crate) mod simulated;
 
 pub use camera::CameraModel;

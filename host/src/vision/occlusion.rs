@@ -78,8 +78,8 @@ impl Mask {
 /// Mean of what is hidden over mean of what is not, at most, after dividing by an ideal light: a
 /// head in front of the target is lit only by what the target scatters.
 const DARKEST_RATIO: f64 = 0.2;
-/// Pixels about the threshold, as a share of the dark ones, at most: an edge is narrow, while
-/// shading runs through all levels.
+/// Pixels about the threshold, as a share of the smaller class, at most: an edge is narrow, while
+/// shading and highlights run through all levels.
 const VALLEY_SHARE: f64 = 0.5;
 /// Levels about the threshold that count as the valley, relative to it.
 const VALLEY: [f64; 2] = [0.6, 1.4];
@@ -89,21 +89,30 @@ const SMALL_THRESHOLD: f64 = 0.25;
 const MARGIN_WIDTHS: f64 = 0.005;
 /// Frames wider than twice this are looked at in cells of several pixels.
 const CELLS_A_ROW: usize = 400;
+/// Distance from the material's edge at which cells are clear of it, pixels.
+const EDGE_PX: f64 = 3.0;
+/// Cells this far either side of an edge ...
+const STEP_CELLS: usize = 3;
+/// ... are on a step when one has less than this share of the other's light.
+const STEP_RATIO: f32 = 0.25;
 const LEVELS: usize = 256;
 
 /// The mask of what hides the material in a frame of the reference, or `None` when nothing does.
 ///
 /// Otsu's method always finds a threshold; it is believed only when the two classes it makes are
-/// those of an occlusion: the dark one far darker than an ideal light explains, and hardly a pixel
-/// between them.
+/// those of an occlusion: the dark one far darker than an ideal light explains, hardly a pixel
+/// between them, and a step wherever they meet.
 pub fn find_occlusion(
     frame: &Frame,
     registration: &Registration,
     light: Direction,
     rig: &Rig,
 ) -> Option<Mask> {
-    let pixels = material_pixels(frame, registration, light, rig)?;
-    let mut sorted: Vec<f32> = pixels.iter().map(|p| p.1).collect();
+    let cells = Cells::of_material(frame, registration, light, rig)?;
+    let mut sorted: Vec<f32> = cells.present().collect();
+    if sorted.is_empty() {
+        return None;
+    }
     let middle = sorted.len() / 2;
     let median = f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1);
     // With half of the material hidden the median says little, but the brightest still do.
@@ -112,81 +121,136 @@ pub fn find_occlusion(
     if bright.is_nan() || bright <= 0.0 {
         return None;
     }
-    let histogram = histogram(&pixels, bright);
+    let histogram = histogram(&sorted, bright);
     let otsu = otsu_level(&histogram) as f64 * bright / LEVELS as f64;
     let threshold = [otsu, SMALL_THRESHOLD * median.max(0.3 * bright)]
         .into_iter()
-        .find(|t| is_occlusion(&pixels, *t))? as f32;
-    let hidden: Vec<[u32; 2]> = pixels
-        .iter()
-        .filter(|p| p.1 < threshold)
-        .map(|p| p.0)
-        .collect();
-    let cell = cell_px(frame);
-    let margin = ((MARGIN_WIDTHS * frame.width as f64 / cell as f64).ceil() as usize).max(2);
-    let size = [frame.width, frame.height].map(|n| n.div_ceil(cell));
-    Mask::grown(&hidden, margin, size, cell)
+        .find(|t| is_split(&sorted, *t) && cells.is_stepped(*t as f32))? as f32;
+    let hidden: Vec<[u32; 2]> = cells.below(threshold).collect();
+    let margin = ((MARGIN_WIDTHS * frame.width as f64 / cells.side as f64).ceil() as usize).max(2);
+    let size = [frame.width, frame.height].map(|n| n.div_ceil(cells.side));
+    Mask::grown(&hidden, margin, size, cells.side)
 }
 
-/// Side of a cell: what hides the target is far larger than a pixel of a large frame.
-fn cell_px(frame: &Frame) -> usize {
-    (frame.width / CELLS_A_ROW).max(1)
+/// Luminance over an ideal light's, by cells of the frame, each by the pixel in its middle.
+struct Cells {
+    /// Side of a cell, pixels: what hides the target is far larger than a pixel of a large frame.
+    side: usize,
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+    /// Row by row; NaN off the material.
+    values: Vec<f32>,
 }
 
-/// The material's cells, each by its middle pixel, with their luminance over an ideal light's; `None` without any.
-fn material_pixels(
-    frame: &Frame,
-    registration: &Registration,
-    light: Direction,
-    rig: &Rig,
-) -> Option<Vec<([u32; 2], f32)>> {
-    let target_from_pixel = registration.pixel_from_target.inverse()?;
-    let half = rig.target.material_half_mm;
-    // Pixels on the material's edge are part desk.
-    let jacobian = registration.pixel_from_target.jacobian([0.0; 2]);
-    let px_per_mm = |axis: usize| jacobian[axis][0].hypot(jacobian[axis][1]);
-    let inset = [0, 1].map(|axis| half - 3.0 / px_per_mm(axis).max(1e-6));
-    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
-        .map(|c: [f64; 2]| registration.project([c[0] * inset[0], c[1] * inset[1]]));
-    let range = |axis: usize, size: usize| {
-        let low = corners
-            .iter()
-            .map(|c| c[axis])
-            .fold(f64::INFINITY, f64::min);
-        let high = corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
-        low.floor().max(0.0) as usize..(high.ceil().max(0.0) as usize).min(size)
-    };
-    let ideal_light = IdealLight::new(light, rig.light.distance_m);
-    let mut pixels = Vec::new();
-    let cell = cell_px(frame);
-    // Cells by the pixel in their middle.
-    let middles = |range: std::ops::Range<usize>| {
-        (range.start / cell..range.end.div_ceil(cell)).map(move |i| (i, i * cell + cell / 2))
-    };
-    for (y, row) in middles(range(1, frame.height)) {
-        for (x, column) in middles(range(0, frame.width)) {
-            if column >= frame.width || row >= frame.height {
-                continue;
-            }
-            let pixel = [column as f64 + 0.5, row as f64 + 0.5];
-            let at = target_from_pixel.apply(registration.camera().undistort(pixel));
-            if at[0].abs() > inset[0] || at[1].abs() > inset[1] {
-                continue;
-            }
-            let value = luminance(frame.rgb[row * frame.width + column]);
-            if value.is_finite() {
-                let relative = value / ideal_light.irradiance(at) as f32;
-                pixels.push(([x as u32, y as u32], relative));
+impl Cells {
+    /// The material's cells; `None` when none is in the frame.
+    fn of_material(
+        frame: &Frame,
+        registration: &Registration,
+        light: Direction,
+        rig: &Rig,
+    ) -> Option<Self> {
+        let target_from_pixel = registration.pixel_from_target.inverse()?;
+        // Pixels on the material's edge are part desk.
+        let jacobian = registration.pixel_from_target.jacobian([0.0; 2]);
+        let inset = jacobian.map(|column| {
+            rig.target.material_half_mm - EDGE_PX / column[0].hypot(column[1]).max(1e-6)
+        });
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|c: [f64; 2]| registration.project([c[0] * inset[0], c[1] * inset[1]]));
+        let side = (frame.width / CELLS_A_ROW).max(1);
+        let range = |axis: usize, size: usize| {
+            let low = corners
+                .iter()
+                .map(|c| c[axis])
+                .fold(f64::INFINITY, f64::min);
+            let high = corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
+            let whole = size / side;
+            let first = (low.max(0.0) as usize / side).min(whole);
+            first..(high as usize / side + 1).clamp(first, whole)
+        };
+        let (columns, rows) = (range(0, frame.width), range(1, frame.height));
+        let ideal_light = IdealLight::new(light, rig.light.distance_m);
+        let mut values = Vec::with_capacity(columns.len() * rows.len());
+        for y in rows.clone() {
+            for x in columns.clone() {
+                let [column, row] = [x, y].map(|i| i * side + side / 2);
+                let pixel = [column as f64 + 0.5, row as f64 + 0.5];
+                let at = target_from_pixel.apply(registration.camera().undistort(pixel));
+                let inside = at[0].abs() <= inset[0] && at[1].abs() <= inset[1];
+                values.push(if inside {
+                    luminance(frame.rgb[row * frame.width + column])
+                        / ideal_light.irradiance(at) as f32
+                } else {
+                    f32::NAN
+                });
             }
         }
+        (!values.is_empty()).then_some(Self {
+            side,
+            left: columns.start,
+            top: rows.start,
+            width: columns.len(),
+            height: rows.len(),
+            values,
+        })
     }
-    (!pixels.is_empty()).then_some(pixels)
+
+    fn present(&self) -> impl Iterator<Item = f32> {
+        self.values.iter().copied().filter(|v| v.is_finite())
+    }
+
+    /// The cells darker than a threshold, by column and row of the frame's cells.
+    fn below(&self, threshold: f32) -> impl Iterator<Item = [u32; 2]> {
+        let dark = move |(i, v): (usize, &f32)| (*v < threshold).then_some(i);
+        self.values.iter().enumerate().filter_map(dark).map(|i| {
+            [
+                (self.left + i % self.width) as u32,
+                (self.top + i / self.width) as u32,
+            ]
+        })
+    }
+
+    /// Whether dark and bright meet in a step, as at the edge of a body: a few cells either side of
+    /// it differ by much. Highlights and shadows of shape are slopes.
+    fn is_stepped(&self, threshold: f32) -> bool {
+        let (mut steps, mut slopes) = (0u32, 0u32);
+        let mut look = |a: usize, b: usize, before: usize, after: usize| {
+            if (self.values[a] < threshold) == (self.values[b] < threshold) {
+                return;
+            }
+            let (x, y) = (self.values[before], self.values[after]);
+            if x.is_finite() && y.is_finite() {
+                let is_step = x.min(y) < STEP_RATIO * x.max(y);
+                *if is_step { &mut steps } else { &mut slopes } += 1;
+            }
+        };
+        let n = STEP_CELLS;
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let at = y * self.width + x;
+                if !self.values[at].is_finite() {
+                    continue;
+                }
+                if x >= n && x + n + 1 < self.width && self.values[at + 1].is_finite() {
+                    look(at, at + 1, at - n, at + 1 + n);
+                }
+                let next = at + self.width;
+                if y >= n && y + n + 1 < self.height && self.values[next].is_finite() {
+                    look(at, next, at - n * self.width, next + n * self.width);
+                }
+            }
+        }
+        steps > slopes
+    }
 }
 
-fn histogram(pixels: &[([u32; 2], f32)], bright: f64) -> [u32; LEVELS] {
+fn histogram(values: &[f32], bright: f64) -> [u32; LEVELS] {
     let scale = (LEVELS as f64 / bright) as f32;
     let mut histogram = [0; LEVELS];
-    for (_, value) in pixels {
+    for value in values {
         histogram[((value * scale).max(0.0) as usize).min(LEVELS - 1)] += 1;
     }
     histogram
@@ -217,10 +281,11 @@ fn otsu_level(histogram: &[u32; LEVELS]) -> usize {
     best_level + empty.count() / 2
 }
 
-fn is_occlusion(pixels: &[([u32; 2], f32)], threshold: f64) -> bool {
+/// Whether a threshold parts two classes as an occlusion does.
+fn is_split(values: &[f32], threshold: f64) -> bool {
     let (mut dark, mut bright) = ((0u32, 0.0), (0u32, 0.0));
     let mut between = 0u32;
-    for (_, value) in pixels {
+    for value in values {
         let value = f64::from(*value);
         let class = if value < threshold {
             &mut dark
@@ -235,7 +300,7 @@ fn is_occlusion(pixels: &[([u32; 2], f32)], threshold: f64) -> bool {
     dark.0 > 0
         && bright.0 > 0
         && dark.1 / f64::from(dark.0) < DARKEST_RATIO * bright.1 / f64::from(bright.0)
-        && f64::from(between) <= VALLEY_SHARE * f64::from(dark.0)
+        && f64::from(between) <= VALLEY_SHARE * f64::from(dark.0.min(bright.0))
 }
 
 #[cfg(test)]
@@ -265,13 +330,25 @@ mod tests {
 
     #[test]
     fn shading_through_all_levels_is_no_occlusion() {
-        let ramp: Vec<_> = (0..1000u32)
-            .map(|i| ([i, 0], 0.02 + i as f32 * 1e-3))
+        let ramp: Vec<f32> = (0..1000).map(|i| 0.02 + i as f32 * 1e-3).collect();
+        assert!(!is_split(&ramp, 0.3));
+        let step: Vec<f32> = (0..1000)
+            .map(|i| if i < 100 { 0.015 } else { 1.0 })
             .collect();
-        assert!(!is_occlusion(&ramp, 0.3));
-        let step: Vec<_> = (0..1000u32)
-            .map(|i| ([i, 0], if i < 100 { 0.015 } else { 1.0 }))
-            .collect();
-        assert!(is_occlusion(&step, 0.3));
+        assert!(is_split(&step, 0.3));
+    }
+
+    #[test]
+    fn a_slope_is_no_step() {
+        let cells = |value: &dyn Fn(usize) -> f32| Cells {
+            side: 1,
+            left: 0,
+            top: 0,
+            width: 40,
+            height: 40,
+            values: (0..1600).map(|i| value(i % 40)).collect(),
+        };
+        assert!(cells(&|x| if x < 20 { 0.02 } else { 1.0 }).is_stepped(0.3));
+        assert!(!cells(&|x| 0.02 + 0.03 * x as f32).is_stepped(0.3));
     }
 }

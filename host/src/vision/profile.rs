@@ -11,6 +11,9 @@ use super::lines::RunSample;
 /// How far the fit's window goes past an edge, in standard deviations of the blur, plus a pixel.
 const WINDOW_SIGMAS: f64 = 3.0;
 
+/// How far it goes into the material, likewise.
+const MATERIAL_SIGMAS: f64 = 1.5;
+
 /// Width of line and gap at a station, pixels.
 #[derive(Clone, Copy)]
 pub struct Profile {
@@ -47,8 +50,9 @@ impl Profile {
         // A gap wide enough to stand in keeps the material out of it.
         let clear = self.edge - WINDOW_SIGMAS * self.sigma;
         let with_material = clear < self.half_width + margin;
+        // Little of the material: it may have a pattern of its own.
         let inner = if with_material {
-            self.edge + margin
+            self.edge + MATERIAL_SIGMAS * self.sigma + 1.0
         } else {
             outer
         };
@@ -112,10 +116,11 @@ fn fit_rows(rows: &[Row], with_material: bool) -> Option<StationFit> {
     let mut gram = [[0.0; 3]; 3];
     let mut right = [0.0; 3];
     for row in rows {
-        for i in 0..unknowns {
-            right[i] += row.basis[i] * row.value;
-            for j in 0..unknowns {
-                gram[i][j] += row.basis[i] * row.basis[j];
+        // Without material its basis is zero, and so are its products.
+        for (i, basis) in row.basis.iter().enumerate() {
+            right[i] += basis * row.value;
+            for (sum, other) in gram[i].iter_mut().zip(row.basis) {
+                *sum += basis * other;
             }
         }
     }

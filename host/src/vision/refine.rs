@@ -22,6 +22,8 @@ const MIN_STATIONS: usize = 8;
 
 /// A line that this share of its stations shows at the start needs no other start.
 const PLAINLY_THERE: f64 = 0.9;
+/// With less than this between line and material the fit has minima beside the right one, pixels.
+const CROWDED_PX: f64 = 2.0;
 /// Lines closer than this are one, pixels.
 const SAME_LINE_PX: f64 = 0.8;
 /// By how much more of the stations a line far from the prediction must be supported than one close
@@ -55,12 +57,38 @@ struct LineSums {
     share: f64,
     count: usize,
     scatter_px: f64,
+    /// Squared residual of the median station, per degree of freedom.
+    level: f64,
 }
 
-/// Fits the lines of four strips; each starts at the prediction and at what Hough found, and the
-/// better supported start wins.
-pub fn fit_lines(strips: &[LineStrip; 4], hough: [Option<StripLine>; 4], target: &Target) -> Fit {
-    let starts = [0, 1, 2, 3].map(|i| best_start(&strips[i], hough[i], target));
+impl LineSums {
+    /// Large for lines that few stations show, or that leave much unexplained.
+    fn badness(&self) -> f64 {
+        if self.share > 0.0 {
+            self.level / (self.share * self.share)
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// Where to look for the lines.
+pub enum Starts {
+    /// Where they are predicted.
+    Predicted,
+    /// There, a pixel to either side, and where Hough found a line.
+    Around([Option<StripLine>; 4]),
+}
+
+/// Fits the lines of four strips.
+pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> Fit {
+    let starts = [0, 1, 2, 3].map(|i| match starts {
+        Starts::Predicted => {
+            let line = StripLine::default();
+            (line, sum_line(&strips[i], line, START_SIGMA_PX, target))
+        }
+        Starts::Around(hough) => best_start(&strips[i], hough[i], target),
+    });
     let mut lines = starts.each_ref().map(|start| start.0);
     let mut sums = starts.map(|start| start.1);
     let mut sigma = START_SIGMA_PX;
@@ -98,8 +126,9 @@ fn is_found(sums: &LineSums) -> bool {
     sums.count >= MIN_STATIONS && sums.share >= MIN_SHARE
 }
 
-/// Where to start a line: at its prediction if that shows it, else wherever a few steps with the
-/// blur held lead to, from the prediction or from Hough's line, that shows more of it.
+/// Where to start a line: at its prediction if that shows it plainly, else wherever a few steps
+/// with the blur held lead to from starts about the prediction, or from Hough's line if far more
+/// speaks for that.
 fn best_start(
     strip: &LineStrip,
     hough: Option<StripLine>,
@@ -107,10 +136,22 @@ fn best_start(
 ) -> (StripLine, LineSums) {
     let predicted = StripLine::default();
     let sums = sum_line(strip, predicted, START_SIGMA_PX, target);
-    if sums.share > PLAINLY_THERE {
+    let gap = target.line_offset_mm - target.material_half_mm - 0.5 * target.line_width_mm;
+    let crowded = gap * strip.px_per_mm() < CROWDED_PX;
+    if sums.share > PLAINLY_THERE && !crowded {
         return (predicted, sums);
     }
-    let near = few_steps(strip, predicted, sums, target);
+    let mut near = few_steps(strip, predicted, sums, target);
+    if crowded {
+        for offset in [-1.0, 1.0] {
+            let start = StripLine { offset, slope: 0.0 };
+            let sums = sum_line(strip, start, START_SIGMA_PX, target);
+            let other = few_steps(strip, start, sums, target);
+            if other.1.badness() < near.1.badness() {
+                near = other;
+            }
+        }
+    }
     match hough {
         Some(line) if line.distance(near.0) > SAME_LINE_PX => {
             let sums = sum_line(strip, line, START_SIGMA_PX, target);
@@ -173,6 +214,7 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
         share: 0.0,
         count: 0,
         scatter_px: 0.0,
+        level: 0.0,
     };
     let shows = |fit: &StationFit| fit.line > 0.0 && fit.gain > EXPLAINED * (fit.gain + fit.rss);
     let mut levels: Vec<f64> = fits
@@ -186,6 +228,7 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
     let middle = levels.len() / 2;
     // A frame without noise still has the model's own error.
     let level = (*levels.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-20);
+    sums.level = level;
     let mut scatter = 0.0;
     for (station, fit) in &fits {
         if !shows(fit) {

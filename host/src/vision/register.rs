@@ -7,9 +7,9 @@
 
 use super::camera::{CameraModel, CameraShift};
 use super::homography::Homography;
-use super::hough::strongest_line;
+use super::hough::{StripLine, strongest_line};
 use super::lines::{LineStrip, SIDES};
-use super::refine::{Fit, FoundLine, fit_lines};
+use super::refine::{Fit, FoundLine, Starts, fit_lines};
 use crate::dataset::rig::Target;
 use crate::dataset::{Frame, Rig};
 use gonia_brdf::{Direction, Pose};
@@ -28,11 +28,16 @@ const MODEL_PX: f64 = 0.02;
 /// Floor of a line's own standard error, pixels.
 const LINE_FLOOR_PX: f64 = 0.003;
 /// Lines that the moved camera misses by more than this share of the width are not the target's.
-const MISFIT_WIDTHS: f64 = 1e-3;
+const MISFIT_WIDTHS: f64 = 6e-4;
 /// Nothing is believed of a frame in which fewer lines are seen.
 const MIN_LINES: usize = 3;
-/// What leaving out a line must save in squared standard deviations.
-const COST_OF_DROPPING: f64 = 60.0;
+/// Sum of squared standard deviations (of fourteen numbers with six unknowns; 8 is usual) above
+/// which something is wrong.
+const MAX_SURPRISE: f64 = 25.0;
+/// Nor are lines that want roll, shift or magnification this many standard deviations off.
+const MAX_DEVIATION: f64 = 6.0;
+/// Standard deviation of an arm that does not hold its 0.03°.
+const LOOSE_ARM_DEG: f64 = 0.5;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
@@ -95,10 +100,14 @@ pub enum Reason {
         found: usize,
     },
     /// The lines found are not those of the target under this camera.
-    #[error("the lines found miss the target's layout by {misfit_px:.1} pixels")]
+    #[error(
+        "the lines found are not laid out as this camera sees the target's (they miss by {misfit_px:.2} pixels, at {deviation:.0} times the camera's usual deviations)"
+    )]
     WrongLayout {
         /// RMS distance from the best camera, pixels.
         misfit_px: f64,
+        /// How far that camera's roll, shift or magnification is off, in standard deviations.
+        deviation: f64,
     },
     /// The lines ask for a camera too far from its arm's reading.
     #[error("the lines put the camera {offset_deg:.1} degrees from its arm's reading")]
@@ -132,13 +141,12 @@ impl Registrar {
     /// Registers a frame taken at the given reading of the arms. Never fails: without marks it
     /// falls back to the prediction, and says so.
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
-        let mut from = self.camera.predict(reading.view, CameraShift::default());
-        let mut solved = self.solve(frame, reading.view, &from);
+        let predicted = self.camera.predict(reading.view, CameraShift::default());
+        let mut solved = self.solve(frame, reading.view, &predicted);
         if let Ok(solution) = &solved
             && solution.furthest_px > RELINEARIZE_PX
         {
-            from = solution.homography.clone();
-            solved = self.solve(frame, reading.view, &from);
+            solved = self.solve(frame, reading.view, &solution.homography);
         }
         match solved {
             Ok(solution) => Registration {
@@ -157,14 +165,14 @@ impl Registrar {
                 state: State::Locked,
                 camera: self.camera.clone(),
             },
-            Err((reason, fit)) => Registration {
-                pixel_from_target: self.camera.predict(reading.view, CameraShift::default()),
-                residual_px: scatter(&fit),
+            Err(failure) => Registration {
+                pixel_from_target: predicted,
+                residual_px: failure.scatter_px,
                 pose_offset: PoseOffset::default(),
                 view: reading.view,
-                blur_px: fit.sigma_px,
-                lines_found: fit.lines.iter().flatten().count(),
-                state: State::FellBack(reason),
+                blur_px: failure.blur_px,
+                lines_found: failure.lines_found,
+                state: State::FellBack(failure.reason),
                 camera: self.camera.clone(),
             },
         }
@@ -175,7 +183,7 @@ impl Registrar {
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
-    ) -> Result<Solution, (Reason, Fit)> {
+    ) -> Result<Solution, Failure> {
         let search_px = SEARCH_WIDTHS * frame.width as f64 + 4.0;
         let strips = SIDES.map(|side| {
             LineStrip::cut(
@@ -187,27 +195,61 @@ impl Registrar {
                 search_px,
             )
         });
+        let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+        if fit.lines.iter().all(Option::is_some) {
+            let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
+            // All four lines where a trusted camera sees them: no need to look elsewhere.
+            if estimate.surprise <= MAX_SURPRISE {
+                return self.settle(view, &strips, fit, estimate);
+            }
+        }
         let half_width = 0.5 * self.target.line_width_mm;
         let hough = [0, 1, 2, 3].map(|i| strongest_line(&strips[i], half_width, search_px));
-        let fit = fit_lines(&strips, hough, &self.target);
+        self.search(view, &strips, hough).or_else(|failure| {
+            // A striped fabric may have lines of its own, stronger than the marks beside them.
+            self.search(view, &strips, [None; 4]).map_err(|_| failure)
+        })
+    }
+
+    /// Looks for the lines about the prediction and where Hough found some.
+    fn search(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        hough: [Option<StripLine>; 4],
+    ) -> Result<Solution, Failure> {
+        let fit = fit_lines(strips, &Starts::Around(hough), &self.target);
         let found = fit.lines.iter().flatten().count();
         if found < MIN_LINES {
-            return Err((Reason::LinesMissing { found }, fit));
+            return Err(Failure::new(Reason::LinesMissing { found }, &fit));
         }
-        let estimate = self.best_estimate(view, &strips, &fit.lines);
-        let width = frame.width as f64;
-        if estimate.misfit_px.is_nan() || estimate.misfit_px > (MISFIT_WIDTHS * width).max(0.3) {
-            let misfit_px = estimate.misfit_px;
-            return Err((Reason::WrongLayout { misfit_px }, fit));
+        let estimate = self.best_estimate(view, strips, &fit.lines);
+        self.settle(view, strips, fit, estimate)
+    }
+
+    /// Judges four fitted lines, and makes the homography of them.
+    fn settle(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        fit: Fit,
+        estimate: Estimate,
+    ) -> Result<Solution, Failure> {
+        let width = self.camera.size_px[0] as f64;
+        let fits = estimate.misfit_px <= (MISFIT_WIDTHS * width).max(0.2)
+            && estimate.camera_deviation <= MAX_DEVIATION
+            // Three lines may not overrule the rig.
+            && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
+        if !fits {
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
         }
         let shift = estimate.shift;
         let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
         if offset_deg > MAX_OFFSET_DEG {
-            return Err((Reason::FarFromPose { offset_deg }, fit));
+            return Err(Failure::new(Reason::FarFromPose { offset_deg }, &fit));
         }
-        let Some(homography) = self.homography(&strips, &estimate.lines) else {
-            let misfit_px = estimate.misfit_px;
-            return Err((Reason::WrongLayout { misfit_px }, fit));
+        let Some(homography) = self.homography(strips, &estimate.lines) else {
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
         };
         let furthest_px = estimate.lines.iter().map(|l| l.abs()).fold(0.0, f64::max);
         Ok(Solution {
@@ -220,28 +262,46 @@ impl Registrar {
         })
     }
 
-    /// The estimate from all lines found, or from all but one where that one contradicts the rest:
-    /// something else was taken for it.
+    /// The estimate that believes most: all lines and the arm's reading; all lines and an arm that
+    /// is off; all lines but one, where that one contradicts the rest because something else was
+    /// taken for it; at last all lines, and a layout that is not quite what the rig says.
     fn best_estimate(
         &self,
         view: Direction,
         strips: &[LineStrip; 4],
         lines: &[Option<FoundLine>; 4],
     ) -> Estimate {
-        let mut best = self.estimate(view, strips, lines);
-        if best.lines_used <= MIN_LINES || best.surprise <= COST_OF_DROPPING {
+        let trusting = self.estimate(view, strips, lines, &self.trust(ARM_DEG));
+        if trusting.surprise <= MAX_SURPRISE {
+            return trusting;
+        }
+        let arm_off = self.estimate(view, strips, lines, &self.trust(LOOSE_ARM_DEG));
+        if arm_off.surprise <= MAX_SURPRISE {
+            return arm_off;
+        }
+        if arm_off.lines_used == MIN_LINES {
+            return arm_off;
+        }
+        let without = (0..4).map(|i| {
+            let mut rest = *lines;
+            rest[i] = None;
+            self.estimate(view, strips, &rest, &self.trust(ARM_DEG))
+        });
+        let best = without.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        if let Some(best) = best.filter(|e| e.surprise <= MAX_SURPRISE) {
             return best;
         }
-        for i in 0..4 {
-            let mut without = *lines;
-            without[i] = None;
-            let mut estimate = self.estimate(view, strips, &without);
-            estimate.surprise += COST_OF_DROPPING;
-            if estimate.surprise < best.surprise {
-                best = estimate;
-            }
+        let mut trust = self.trust(LOOSE_ARM_DEG);
+        trust.model_px = trust.model_px.max(arm_off.misfit_px);
+        self.estimate(view, strips, lines, &trust)
+    }
+
+    fn trust(&self, arm_deg: f64) -> Trust {
+        let width = self.camera.size_px[0] as f64;
+        Trust {
+            arm_deg,
+            model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
         }
-        best
     }
 
     /// The camera, moved from its reading, that fits the lines best, and the lines as they follow
@@ -252,8 +312,9 @@ impl Registrar {
         view: Direction,
         strips: &[LineStrip; 4],
         lines: &[Option<FoundLine>; 4],
+        trust: &Trust,
     ) -> Estimate {
-        let tau = (MODEL_PX_PER_1000 * 1e-3 * self.camera.size_px[0] as f64).max(MODEL_PX);
+        let tau = trust.model_px;
         let found: Vec<usize> = (0..8).filter(|k| lines[k / 2].is_some()).collect();
         let n = found.len();
         let mut measured = DVector::zeros(n);
@@ -278,11 +339,12 @@ impl Registrar {
             lines_used: n / 2,
             surprise: f64::INFINITY,
             misfit_px: f64::NAN,
+            camera_deviation: f64::NAN,
         };
         let Some(weight) = covariance.cholesky().map(|c| c.inverse()) else {
             return failed;
         };
-        let scale = self.prior_scale();
+        let scale = self.prior_scale(trust.arm_deg);
         let model = |p: &DVector<f64>| self.line_places(view, shift_from(p, &scale), strips);
         let mut p = DVector::zeros(6);
         let mut places = model(&p);
@@ -318,14 +380,15 @@ impl Registrar {
             lines_used: n / 2,
             surprise: (residual.transpose() * &weight * &residual)[0] + p.norm_squared(),
             misfit_px: residual.norm() / (n as f64).sqrt(),
+            camera_deviation: p.rows(2, 4).amax(),
         }
     }
 
-    fn prior_scale(&self) -> [f64; 6] {
+    fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {
         let shift = SHIFT_WIDTHS * self.camera.size_px[0] as f64;
         [
-            ARM_DEG.to_radians(),
-            ARM_DEG.to_radians(),
+            arm_deg.to_radians(),
+            arm_deg.to_radians(),
             ROLL_DEG.to_radians(),
             shift,
             shift,
@@ -380,6 +443,25 @@ struct Solution {
     furthest_px: f64,
 }
 
+/// Why there is no solution, and what was seen nevertheless.
+struct Failure {
+    reason: Reason,
+    scatter_px: f64,
+    blur_px: f64,
+    lines_found: usize,
+}
+
+impl Failure {
+    fn new(reason: Reason, fit: &Fit) -> Self {
+        Self {
+            reason,
+            scatter_px: scatter(fit),
+            blur_px: fit.sigma_px,
+            lines_found: fit.lines.iter().flatten().count(),
+        }
+    }
+}
+
 struct Estimate {
     shift: CameraShift,
     /// Offset and slope of each line.
@@ -389,6 +471,25 @@ struct Estimate {
     surprise: f64,
     /// RMS distance of the measured lines from the moved camera's.
     misfit_px: f64,
+    /// The largest of roll, shift and magnification, in standard deviations of its prior.
+    camera_deviation: f64,
+}
+
+/// How far reading and model are believed.
+struct Trust {
+    /// Standard deviation of the arm's reading, degrees.
+    arm_deg: f64,
+    /// Standard deviation of the model's lines, pixels.
+    model_px: f64,
+}
+
+impl Estimate {
+    fn wrong_layout(&self) -> Reason {
+        Reason::WrongLayout {
+            misfit_px: self.misfit_px,
+            deviation: self.camera_deviation,
+        }
+    }
 }
 
 fn shift_from(p: &DVector<f64>, scale: &[f64; 6]) -> CameraShift {

@@ -180,16 +180,16 @@ impl Sampler<'_> {
                         return Err(LeftOut::Occlusion);
                     }
                     let rgb = self.frame.rgb[row * self.frame.width + column];
-                    for c in 0..3 {
-                        value[c] += wc * wr * rgb[c];
+                    for (sum, v) in value.iter_mut().zip(rgb) {
+                        *sum += wc * wr * v;
                     }
                 }
             }
             if !value.iter().all(|v| v.is_finite()) {
                 return Err(LeftOut::NotFinite);
             }
-            for c in 0..3 {
-                self.channels[c].push(value[c]);
+            for (channel, v) in self.channels.iter_mut().zip(value) {
+                channel.push(v);
             }
         }
         Ok(self.value([0.0; 2], 0))

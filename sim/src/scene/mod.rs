@@ -197,11 +197,14 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Mean radiance at the target's centre: what the exposure is chosen for.
+    /// The radiance that the exposure is chosen for: the material's mean at the target's centre, or
+    /// a white surface's where the material shines more than that. Of an HDR series the longest
+    /// exposure serves the surface, and shorter ones its highlights.
     fn typical_radiance(&self) -> f64 {
         let (light, view) = (self.pose.light.to_vec3(), self.pose.view.to_vec3());
         let f = self.brdf.eval(light, view);
-        (f[0] + f[1] + f[2]) / 3.0 * light[2]
+        let mean = (f[0] + f[1] + f[2]) / 3.0;
+        mean.min(std::f64::consts::FRAC_1_PI) * light[2]
     }
 
     fn radiance(&self, column: usize, row: usize) -> [f32; 3] {

@@ -1,0 +1,191 @@
+//! Sampling and occlusion against the simulator's truth.
+
+use super::camera::CameraShift;
+use super::ideal_light::IdealLight;
+use super::occlusion::find_occlusion;
+use super::simulated::{pose, render, rig, scene};
+use super::*;
+use gonia_brdf::direction::{angle_between, local_direction};
+use gonia_sim::scene::{Surface, true_brdf};
+
+#[test]
+fn directions_of_samples_are_true_to_two_hundredths_of_a_degree() {
+    for px in [400, 1024] {
+        let scene = scene(px);
+        let rig = rig(&scene.geometry);
+        let grid = SamplingGrid::new(&rig);
+        for angles in [
+            [30.0, 140.0, 0.0, 0.0],
+            [0.0, 0.0, 45.0, 200.0],
+            [60.0, 20.0, 60.0, 90.0],
+            [15.0, 10.0, 75.0, 45.0],
+        ] {
+            let truth = pose(angles);
+            let mut reading = truth;
+            reading.view.theta += 0.01f64.to_radians();
+            let frame = render(&scene, Surface::Material, truth, 5);
+            let found = Registrar::new(&rig).register(&frame, reading);
+            let true_map = CameraModel::new(&rig.camera)
+                .predict(truth.view, CameraShift::default())
+                .inverse()
+                .unwrap();
+            for at in grid.points_mm() {
+                // What is believed to be at `at` is, in truth, here:
+                let there = true_map.apply(found.project(*at));
+                let metres = |p: [f64; 2]| p.map(|c| c * 1e-3);
+                let light = angle_between(
+                    local_direction(truth.light, 1.1, metres(*at)),
+                    local_direction(truth.light, 1.1, metres(there)),
+                );
+                let view = angle_between(
+                    local_direction(found.view, 1.8, metres(*at)),
+                    local_direction(truth.view, 1.8, metres(there)),
+                );
+                let error_deg = light.max(view).to_degrees();
+                assert!(error_deg < 0.02, "{px} {angles:?} {at:?}: {error_deg}");
+            }
+        }
+    }
+}
+
+#[test]
+fn values_belong_to_the_place_they_name_even_where_patches_hold_few_pixels() {
+    // Without noise the value over the ideal light is the BRDF at the pixels' centre: also at
+    // 200 px and θv = 75°, where a patch is 2.4 × 0.6 pixels and is interpolated.
+    for (px, limit, fewest) in [(1024, 2e-3, 20), (400, 5e-3, 4), (200, 1e-2, 0)] {
+        let mut scene = scene(px);
+        scene.noise = None;
+        scene.beam = None;
+        let rig = rig(&scene.geometry);
+        let grid = SamplingGrid::new(&rig);
+        for angles in [[30.0, 140.0, 15.0, 40.0], [45.0, 200.0, 75.0, 120.0]] {
+            let truth = pose(angles);
+            let frame = render(&scene, Surface::Material, truth, 0);
+            let found = Registrar::new(&rig).register(&frame, truth);
+            let light = IdealLight::new(truth.light, 1.1);
+            for (at, value) in grid
+                .points_mm()
+                .iter()
+                .zip(grid.sample(&frame, &found, None))
+            {
+                let value = value.unwrap();
+                // The few patches that hold fewer pixels are interpolated.
+                assert!(value.pixels == 0 || value.pixels >= fewest);
+                let place = [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]));
+                let f = true_brdf(scene.material.as_ref(), &scene.geometry, truth, place);
+                let measured = f64::from(value.rgb[0]) / light.irradiance(place);
+                let error = (measured / f[0]).ln().abs();
+                assert!(error < limit, "{px} {angles:?} {at:?}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn occluded_patches_are_left_out_and_no_others() {
+    let scene = scene(400);
+    let mut open = scene.clone();
+    open.occluder = None;
+    let rig = rig(&scene.geometry);
+    let grid = SamplingGrid::new(&rig);
+    let registrar = Registrar::new(&rig);
+    for angles in [
+        [30.0, 60.0, 30.0, 60.0],
+        [15.0, 0.0, 15.0, 0.0],
+        [60.0, 90.0, 60.0, 96.0],
+        [15.0, 60.0, 75.0, 60.0],
+        [75.0, 15.0, 75.0, 15.0],
+        [30.0, 90.0, 36.0, 84.0],
+    ] {
+        let truth = pose(angles);
+        let reference = render(&scene, Surface::Reference, truth, 1);
+        let found = registrar.register(&reference, truth);
+        let mask = find_occlusion(&reference, &found, truth.light, &rig);
+        let hidden = grid.sample(
+            &render(&scene, Surface::Material, truth, 2),
+            &found,
+            mask.as_ref(),
+        );
+        let whole = grid.sample(&render(&open, Surface::Material, truth, 2), &found, None);
+        let (mut kept, mut wrongly_kept, mut wrongly_left) = (0, 0, 0);
+        let unmasked = grid.sample(&render(&scene, Surface::Material, truth, 2), &found, None);
+        for ((masked, unmasked), whole) in hidden.iter().zip(&unmasked).zip(&whole) {
+            let (unmasked, whole) = (unmasked.unwrap(), whole.unwrap());
+            // Same shot, same noise: what the occluder does not touch is the same.
+            let touched = (unmasked.rgb[1] / whole.rgb[1] - 1.0).abs() > 5e-3;
+            match masked {
+                Ok(_) if touched => wrongly_kept += 1,
+                Ok(_) => kept += 1,
+                Err(reason) => {
+                    assert_eq!(*reason, LeftOut::Occlusion);
+                    wrongly_left += usize::from(!touched);
+                }
+            }
+        }
+        assert_eq!(wrongly_kept, 0, "{angles:?}");
+        assert!(kept < 1225, "{angles:?}: nothing was hidden");
+        // The margin costs a rim of patches about the shape.
+        assert!(wrongly_left < 250, "{angles:?}: {wrongly_left}");
+    }
+}
+
+#[test]
+fn frames_that_nothing_hides_have_no_mask() {
+    let scene = scene(400);
+    let rig = rig(&scene.geometry);
+    let registrar = Registrar::new(&rig);
+    for angles in [
+        [0.0, 0.0, 45.0, 90.0],
+        [85.0, 0.0, 75.0, 180.0],
+        [85.0, 90.0, 75.0, 270.0],
+        [85.0, 30.0, 0.0, 0.0],
+        [75.0, 210.0, 75.0, 30.0],
+        [60.0, 100.0, 30.0, 280.0],
+    ] {
+        let truth = pose(angles);
+        for which in [Surface::Reference, Surface::Material] {
+            let frame = render(&scene, which, truth, 1);
+            let found = registrar.register(&frame, truth);
+            let mask = find_occlusion(&frame, &found, truth.light, &rig);
+            assert_eq!(mask, None, "{angles:?} {which:?}");
+        }
+    }
+}
+
+#[test]
+fn patches_with_a_pixel_that_is_no_number_are_left_out() {
+    let scene = scene(400);
+    let rig = rig(&scene.geometry);
+    let truth = pose([30.0, 140.0, 30.0, 10.0]);
+    let mut frame = render(&scene, Surface::Material, truth, 1);
+    frame.rgb[200 * 400 + 200][2] = f32::NAN;
+    let found = Registrar::new(&rig).register(&frame, truth);
+    let points = SamplingGrid::new(&rig).sample(&frame, &found, None);
+    let bad: Vec<_> = points.iter().filter_map(|p| p.err()).collect();
+    assert_eq!(bad, [LeftOut::NotFinite]);
+}
+
+#[test]
+fn patches_beyond_material_or_frame_are_left_out() {
+    let scene = scene(400);
+    let mut rig = rig(&scene.geometry);
+    rig.target.material_half_mm = 250.0;
+    let truth = pose([30.0, 140.0, 0.0, 0.0]);
+    let mut frame = render(&scene, Surface::Material, truth, 1);
+    let found = Registrar::new(&rig).register(&frame, truth);
+    let grid = SamplingGrid::new(&rig);
+    let count = |frame: &crate::dataset::Frame, reason| {
+        let points = grid.sample(frame, &found, None);
+        points.iter().filter(|p| **p == Err(reason)).count()
+    };
+    let beyond = |limit: f64| {
+        let far = |p: &&[f64; 2]| p[0].abs().max(p[1].abs()) + 7.0 > limit;
+        grid.points_mm().iter().filter(far).count()
+    };
+    assert_eq!(count(&frame, LeftOut::Mark), beyond(250.0));
+    assert_eq!(count(&frame, LeftOut::Border), 0);
+    // The same image cut off below row 250.
+    frame.rgb.truncate(250 * 400);
+    frame.height = 250;
+    assert!(count(&frame, LeftOut::Border) > 100);
+}
