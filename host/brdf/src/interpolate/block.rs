@@ -37,14 +37,16 @@ pub struct BlockSolver {
     /// `K⁻¹ (y − μ)`, channel by channel.
     weights: [Vec<f32>; 3],
     mean: [f32; 3],
+    /// √3 over the range.
+    scale: f32,
     arch: Arch,
 }
 
 impl BlockSolver {
-    /// Fits the process to nodes that lie within `radius` of each other's middle (the radius that
-    /// the range is measured in, covering the cells too). Returns the nugget that was used.
+    /// Fits the process to nodes that lie within `radius` of each other's middle: the radius that the
+    /// range is measured in. Returns the nugget that was used.
     ///
-    /// With fewer than two nodes, or nodes that all lie in one place, the mean is all there is.
+    /// With fewer than two nodes the mean is all there is.
     pub fn fit<'a>(
         &mut self,
         nodes: impl ExactSizeIterator<Item = &'a Node>,
@@ -54,40 +56,36 @@ impl BlockSolver {
         let n = nodes.len();
         let padded = n.next_multiple_of(PAD);
         self.load(nodes, padded);
-        if n < 2 {
-            self.fall_back_to_mean(n);
-            return 1.0;
-        }
-        let scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
-        let mut nugget = None;
-        // A pivot lost to rounding is mended by a larger nugget; three times is plenty, since a
-        // nugget of one makes any kernel matrix diagonally dominant enough.
-        for attempt in 0..8 {
-            let used = self.arch.dispatch(Fit {
-                solver: self,
-                n,
-                padded,
-                scale,
-                settings,
-                nugget,
-            });
-            match used {
-                Ok(value) => return value,
-                Err(tried) => nugget = Some(tried * if attempt < 3 { 4.0 } else { 32.0 }),
+        self.scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
+        if n >= 2 {
+            let mut nugget = None;
+            // A pivot lost to rounding is mended by a larger nugget; the last of these makes any
+            // kernel matrix diagonally dominant enough.
+            for attempt in 0..8 {
+                let used = self.arch.dispatch(Fit {
+                    solver: self,
+                    n,
+                    padded,
+                    settings,
+                    nugget,
+                });
+                match used {
+                    Ok(nugget) => return nugget,
+                    Err(tried) => nugget = Some(tried * if attempt < 3 { 4.0 } else { 32.0 }),
+                }
             }
         }
         self.fall_back_to_mean(n);
         1.0
     }
 
-    /// Adds nothing and changes nothing: evaluates the fitted process at `point`, per channel.
-    pub fn evaluate(&self, point: &Point, radius: f32, settings: &BlockSettings) -> [f32; 3] {
-        let scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
+    /// Evaluates the fitted process at places; appends the logarithm per channel.
+    pub fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; 3]>) {
         self.arch.dispatch(Evaluate {
             solver: self,
-            point,
-            scale,
-        })
+            places,
+            out,
+        });
     }
 
     fn load<'a>(&mut self, nodes: impl ExactSizeIterator<Item = &'a Node>, padded: usize) {
@@ -124,7 +122,6 @@ struct Fit<'a> {
     solver: &'a mut BlockSolver,
     n: usize,
     padded: usize,
-    scale: f32,
     settings: &'a BlockSettings,
     nugget: Option<f32>,
 }
@@ -137,39 +134,19 @@ impl WithSimd for Fit<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let (n, padded) = (self.n, self.padded);
         let s = self.solver;
-        let rows = padded + PAD;
-        s.matrix.resize(padded, rows);
-        let mut sum = 0.0f32;
+        s.matrix.resize(padded, padded + PAD);
+        let correlations = s.fill_matrix(simd, n, padded);
+        let (variance, noise) = s.variances(n, self.settings);
+        // Under the process, the expected variance of n values is σ_f² (1 − mean correlation) +
+        // σ_n². Never believe that all is noise: a tenth of the variance is signal.
+        let pairs = (n * (n - 1) / 2) as f32;
+        let decorrelation = (1.0 - correlations / pairs).max(1e-6);
+        let signal = (variance - noise).max(0.1 * variance).max(1e-12) / decorrelation;
+        let nugget = self.nugget.unwrap_or_else(|| {
+            (self.settings.noise_variance / signal).clamp(self.settings.nugget_min, 1.0)
+        });
         for j in 0..n {
-            let mut place = [simd.splat_f32s(0.0); 6];
-            for k in 0..6 {
-                place[k] = simd.splat_f32s(s.axes[k][j]);
-            }
-            let first = j / S::F32_LANES * S::F32_LANES;
-            let column = s.matrix.column_mut(j);
-            let (target, _) = S::as_mut_simd_f32s(&mut column[first..padded]);
-            let axes = vectors::<S>(&s.axes, first..padded);
-            for (r, t) in target.iter_mut().enumerate() {
-                *t = kernel(simd, &place, &axes, r, self.scale);
-            }
-            sum += column[j + 1..n].iter().sum::<f32>();
-            column[n..].fill(0.0);
-        }
-        let nugget = self
-            .nugget
-            .unwrap_or_else(|| s.nugget_for(n, sum, self.settings));
-        for j in 0..padded {
-            let column = s.matrix.column_mut(j);
-            if j < n {
-                column[j] = 1.0 + nugget / s.counts[j].max(1.0);
-                for c in 0..3 {
-                    column[padded + c] = s.log_values[c][j];
-                }
-                column[padded + 3] = 1.0;
-            } else {
-                column.fill(0.0);
-                column[j] = 1.0;
-            }
+            s.matrix.column_mut(j)[j] = 1.0 + nugget / s.counts[j].max(1.0);
         }
         if !s.matrix.factor(simd, padded) {
             return Err(nugget);
@@ -180,58 +157,85 @@ impl WithSimd for Fit<'_> {
 }
 
 impl BlockSolver {
-    /// Noise over signal variance. The signal's variance follows from that of the nodes' values:
-    /// under the process, the expected variance of n values is `σ_f² (1 − mean correlation) + σ_n²`.
+    /// The kernel matrix, padded by the unit matrix, with the right-hand sides below. Returns the
+    /// sum of the correlations of all pairs.
     #[inline(always)]
-    fn nugget_for(&self, n: usize, correlation_sum: f32, settings: &BlockSettings) -> f32 {
-        if n < 2 {
-            return 1.0;
+    fn fill_matrix<S: Simd>(&mut self, simd: S, n: usize, padded: usize) -> f32 {
+        let mut total = 0.0f32;
+        for j in 0..n {
+            let mut place = [simd.splat_f32s(0.0); 6];
+            for k in 0..6 {
+                place[k] = simd.splat_f32s(self.axes[k][j]);
+            }
+            let first = j / S::F32_LANES * S::F32_LANES;
+            let column = self.matrix.column_mut(j);
+            let (target, _) = S::as_mut_simd_f32s(&mut column[first..padded]);
+            let axes = vectors::<S>(&self.axes, first..padded);
+            let mut sum = simd.splat_f32s(0.0);
+            for (r, t) in target.iter_mut().enumerate() {
+                *t = kernel(simd, &place, &axes, r, self.scale);
+                sum = simd.add_f32s(sum, *t);
+            }
+            // What the whole vectors hold too much: rows up to the diagonal, and the padding.
+            let mut surplus = 0.0;
+            for row in (first..=j).chain(n..padded) {
+                surplus += column[row];
+            }
+            total += simd.reduce_sum_f32s(sum) - surplus;
+            column[n..].fill(0.0);
+            for c in 0..3 {
+                column[padded + c] = self.log_values[c][j];
+            }
+            column[padded + 3] = 1.0;
         }
-        let pairs = (n * (n - 1) / 2) as f32;
-        let decorrelation = (1.0 - correlation_sum / pairs).max(1e-6);
+        for j in n..padded {
+            let column = self.matrix.column_mut(j);
+            column.fill(0.0);
+            column[j] = 1.0;
+        }
+        total
+    }
+
+    /// Variance of the nodes' values, mean over the channels, and the share of it that is noise.
+    fn variances(&self, n: usize, settings: &BlockSettings) -> (f32, f32) {
         let mut variance = 0.0;
         for values in &self.log_values {
-            let mean = values[..n].iter().sum::<f32>() / n as f32;
-            variance += values[..n]
-                .iter()
-                .map(|v| (v - mean) * (v - mean))
-                .sum::<f32>();
+            let (mut sum, mut squares) = (0.0f64, 0.0f64);
+            for value in &values[..n] {
+                sum += f64::from(*value);
+                squares += f64::from(*value) * f64::from(*value);
+            }
+            variance += (squares - sum * sum / n as f64).max(0.0) / (3 * (n - 1)) as f64;
         }
-        variance /= (3 * (n - 1)) as f32;
-        let noise: f32 = settings.noise_variance
-            * self.counts[..n]
-                .iter()
-                .map(|c| 1.0 / c.max(1.0))
-                .sum::<f32>()
-            / n as f32;
-        // Never believe that all is noise: a tenth of the variance is signal.
-        let signal = (variance - noise).max(0.1 * variance).max(1e-12) / decorrelation;
-        (settings.noise_variance / signal).clamp(settings.nugget_min, 1.0)
+        let per_sample: f32 = self.counts[..n].iter().map(|c| 1.0 / c.max(1.0)).sum();
+        (
+            variance as f32,
+            settings.noise_variance * per_sample / n as f32,
+        )
     }
 
     /// Mean and weights from the factor and `L⁻¹ b` in the extra rows.
     #[inline(always)]
     fn solve_back<S: Simd>(&mut self, simd: S, n: usize, padded: usize) {
-        let mut ones_ones = 0.0f32;
-        let mut ones_values = [0.0f32; 3];
+        let mut with_ones = [0.0f32; RHS];
         for j in 0..n {
             let z = &self.matrix.column(j)[padded..padded + RHS];
-            ones_ones += z[3] * z[3];
-            for c in 0..3 {
-                ones_values[c] += z[3] * z[c];
+            for k in 0..RHS {
+                with_ones[k] += z[3] * z[k];
             }
         }
-        self.mean = ones_values.map(|v| v / ones_ones);
+        for c in 0..3 {
+            self.mean[c] = with_ones[c] / with_ones[3];
+        }
         for j in (0..n).rev() {
             let column = self.matrix.column(j);
+            // Weights of rows up to j are still zero, so a whole vector may hold them; what stands
+            // above the diagonal of L is zero but for rounding.
             let first = (j + 1) / S::F32_LANES * S::F32_LANES;
-            // Weights of rows ≤ j are still zero, so starting at a whole vector is harmless: but
-            // entries of L above its diagonal are not numbers to be trusted, only to be skipped.
+            let (l, _) = S::as_simd_f32s(&column[first..padded]);
             let mut dots = [simd.splat_f32s(0.0); 3];
-            let start = first + S::F32_LANES;
-            let (l, _) = S::as_simd_f32s(&column[start.min(padded)..padded]);
             for c in 0..3 {
-                let (w, _) = S::as_simd_f32s(&self.weights[c][start.min(padded)..padded]);
+                let (w, _) = S::as_simd_f32s(&self.weights[c][first..padded]);
                 for (a, b) in l.iter().zip(w) {
                     dots[c] = simd.mul_add_e_f32s(*a, *b, dots[c]);
                 }
@@ -239,10 +243,7 @@ impl BlockSolver {
             let z = &column[padded..padded + RHS];
             let inverse = 1.0 / column[j];
             for c in 0..3 {
-                let mut dot = simd.reduce_sum_f32s(dots[c]);
-                for row in j + 1..start.min(padded) {
-                    dot += column[row] * self.weights[c][row];
-                }
+                let dot = simd.reduce_sum_f32s(dots[c]);
                 self.weights[c][j] = (z[c] - self.mean[c] * z[3] - dot) * inverse;
             }
         }
@@ -251,39 +252,40 @@ impl BlockSolver {
 
 struct Evaluate<'a> {
     solver: &'a BlockSolver,
-    point: &'a Point,
-    scale: f32,
+    places: &'a [Point],
+    out: &'a mut Vec<[f32; 3]>,
 }
 
 impl WithSimd for Evaluate<'_> {
-    type Output = [f32; 3];
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> [f32; 3] {
+    fn with_simd<S: Simd>(self, simd: S) {
         let s = self.solver;
-        let mut place = [simd.splat_f32s(0.0); 6];
-        for k in 0..6 {
-            place[k] = simd.splat_f32s(self.point[k]);
-        }
-        let padded = s.axes[0].len();
-        let axes = vectors::<S>(&s.axes, 0..padded);
+        let axes = vectors::<S>(&s.axes, 0..s.axes[0].len());
         let weights = [
             S::as_simd_f32s(&s.weights[0]).0,
             S::as_simd_f32s(&s.weights[1]).0,
             S::as_simd_f32s(&s.weights[2]).0,
         ];
-        let mut sums = [simd.splat_f32s(0.0); 3];
-        for r in 0..axes[0].len() {
-            let k = kernel(simd, &place, &axes, r, self.scale);
-            for c in 0..3 {
-                sums[c] = simd.mul_add_e_f32s(k, weights[c][r], sums[c]);
+        for point in self.places {
+            let mut place = [simd.splat_f32s(0.0); 6];
+            for k in 0..6 {
+                place[k] = simd.splat_f32s(point[k]);
             }
+            let mut sums = [simd.splat_f32s(0.0); 3];
+            for r in 0..axes[0].len() {
+                let k = kernel(simd, &place, &axes, r, s.scale);
+                for c in 0..3 {
+                    sums[c] = simd.mul_add_e_f32s(k, weights[c][r], sums[c]);
+                }
+            }
+            let mut result = s.mean;
+            for c in 0..3 {
+                result[c] += simd.reduce_sum_f32s(sums[c]);
+            }
+            self.out.push(result);
         }
-        let mut result = s.mean;
-        for c in 0..3 {
-            result[c] += simd.reduce_sum_f32s(sums[c]);
-        }
-        result
     }
 }
 
@@ -379,6 +381,12 @@ mod tests {
             .collect()
     }
 
+    fn at(solver: &BlockSolver, place: &Point) -> [f32; 3] {
+        let mut out = Vec::new();
+        solver.evaluate(&[*place], &mut out);
+        out[0]
+    }
+
     #[test]
     fn a_smooth_function_is_found_again_between_its_nodes() {
         for n in [48, 64, 185] {
@@ -387,7 +395,7 @@ mod tests {
             solver.fit(nodes.iter(), 0.7, &SETTINGS);
             for (x, y) in [(0.1, 0.2), (-0.3, 0.33), (0.0, 0.0)] {
                 let truth = node(x, y, 1.0);
-                let got = solver.evaluate(&truth.point, 0.7, &SETTINGS);
+                let got = at(&solver, &truth.point);
                 for c in 0..3 {
                     let off = (got[c] - truth.log_value[c]).abs();
                     assert!(off < 0.03, "{n} {x} {y} {c}: {off}");
@@ -433,18 +441,13 @@ mod tests {
         let mut solver = BlockSolver::default();
         let same = vec![node(0.2, 0.1, 1.0); 40];
         solver.fit(same.iter(), 0.0, &SETTINGS);
-        let at = solver.evaluate(&same[0].point, 0.0, &SETTINGS);
-        assert!((at[0] - same[0].log_value[0]).abs() < 1e-3, "{at:?}");
+        let value = at(&solver, &same[0].point);
+        assert!((value[0] - same[0].log_value[0]).abs() < 1e-3, "{value:?}");
         solver.fit(same[..1].iter(), 0.0, &SETTINGS);
-        let at = solver.evaluate(&[1.0; 6], 0.0, &SETTINGS);
-        assert!((at[0] - same[0].log_value[0]).abs() < 1e-3, "{at:?}");
+        let value = at(&solver, &[1.0; 6]);
+        assert!((value[0] - same[0].log_value[0]).abs() < 1e-3, "{value:?}");
         solver.fit(same[..0].iter(), 0.0, &SETTINGS);
-        assert!(
-            solver
-                .evaluate(&[1.0; 6], 0.0, &SETTINGS)
-                .iter()
-                .all(|v| v.is_finite())
-        );
+        assert!(at(&solver, &[1.0; 6]).iter().all(|v| v.is_finite()));
     }
 
     #[test]

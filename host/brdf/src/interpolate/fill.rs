@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::block::BlockSolver;
+use super::coordinates::Point;
 use super::neighbours::Neighbours;
 use super::nodes::nodes_of;
 use super::patches::{Patch, cover};
@@ -58,7 +59,8 @@ pub fn fill(
 struct Workspace {
     solver: BlockSolver,
     found: Vec<(f32, u32)>,
-    /// Values of the cells of the block, light by light.
+    places: Vec<Point>,
+    /// Logarithms, then values, of the cells of the block, light by light.
     values: Vec<[f32; 3]>,
 }
 
@@ -74,14 +76,17 @@ impl Workspace {
             radius,
             &block,
         );
-        self.values.clear();
+        self.places.clear();
         for light in &p.vectors {
             for view in &q.vectors {
-                let point = coordinates.point(*light, *view);
-                let log = self.solver.evaluate(&point, radius, &block);
-                // e^±60 are far beyond any BRDF and far within single precision.
-                self.values.push(log.map(|v| v.clamp(-60.0, 60.0).exp()));
+                self.places.push(coordinates.point(*light, *view));
             }
+        }
+        self.values.clear();
+        self.solver.evaluate(&self.places, &mut self.values);
+        for value in &mut self.values {
+            // e^±60 are far beyond any BRDF and far within single precision.
+            *value = value.map(|v| v.clamp(-60.0, 60.0).exp());
         }
     }
 }

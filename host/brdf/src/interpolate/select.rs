@@ -90,8 +90,8 @@ fn log_rms_at(tests: &[&Bin], neighbours: &Neighbours, settings: &Settings) -> f
     let mut squares: Vec<f64> = tests
         .par_iter()
         .map_init(
-            || (BlockSolver::default(), Vec::new()),
-            |(solver, found), bin| {
+            || (BlockSolver::default(), Vec::new(), Vec::new()),
+            |(solver, found, values), bin| {
                 let point = settings
                     .coordinates
                     .point(bin.light.map(f64::from), bin.view.map(f64::from));
@@ -103,7 +103,9 @@ fn log_rms_at(tests: &[&Bin], neighbours: &Neighbours, settings: &Settings) -> f
                     radius,
                     &block,
                 );
-                let log = solver.evaluate(&point, radius, &block);
+                values.clear();
+                solver.evaluate(&[point], values);
+                let log = values[0];
                 (0..3)
                     .filter(|c| bin.median[*c] > 0.0)
                     .map(|c| f64::from(log[c] - bin.median[c].ln()).powi(2))
