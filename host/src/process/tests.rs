@@ -51,7 +51,11 @@ impl FrameSource for Rendered {
             Role::Reference => Surface::Reference,
         };
         if row.pose == pose(UNREADABLE) {
-            return Err("the file is truncated".into());
+            return Err(FileError::new(
+                std::path::Path::new(&row.file),
+                "the file is truncated",
+                "copy it again",
+            ));
         }
         if row.pose == pose(BLIND) {
             let [width, height] = [self.scene.geometry.width_px, self.scene.geometry.height_px];
@@ -308,7 +312,10 @@ fn a_frame_that_cannot_be_read_or_has_another_size_is_named() {
     let error = process(&rig, &source, &|_, _, _| ())
         .unwrap_err()
         .to_string();
-    assert_eq!(error, "frame 12 (frames/000012.exr): the file is truncated");
+    assert_eq!(
+        error,
+        "frame 12: frames/000012.exr: the file is truncated; copy it again"
+    );
     source.rows.clear();
     let error = process(&rig, &source, &|_, _, _| ()).unwrap_err();
     assert!(matches!(error, ProcessError::NoMaterial { rows: 0 }));
