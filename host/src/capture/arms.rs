@@ -7,7 +7,7 @@ use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
 use super::timing::nearest_turn_deg;
-use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport};
+use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport, is_uncalibrated};
 
 /// Longest homing: the whole travel of φ at the default search speed, and the slow approach, µs.
 const HOMING_LIMIT_US: u64 = 240_000_000;
@@ -86,6 +86,23 @@ impl Arms {
     /// The camera arm's controller.
     pub fn camera(&mut self) -> &mut Controller {
         &mut self.camera
+    }
+
+    /// The axes whose encoders have no error map: their true angle is not known to the pointing limit,
+    /// whatever the encoder says.
+    ///
+    /// # Errors
+    /// The link failed.
+    pub fn uncalibrated(&mut self) -> Result<Vec<(String, Axis)>, LinkError> {
+        let mut found = Vec::new();
+        for controller in self.both() {
+            for axis in Axis::BOTH {
+                if is_uncalibrated(controller, axis)? {
+                    found.push((controller.name().to_owned(), axis));
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// Now, by the arms' clock, µs: virtual on a simulated rig.
