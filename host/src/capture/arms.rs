@@ -18,6 +18,10 @@ const FOLLOWER_LIMIT_US: u64 = 300_000;
 /// How long a controller that does not answer is asked again, µs.
 const RECONNECT_LIMIT_US: u64 = 60_000_000;
 
+/// How often bringing the arms back is tried again, and after which pause, µs.
+const RECOVERIES: u32 = 4;
+const PAUSE_US: u64 = 3_000_000;
+
 /// How a session takes its shots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
@@ -246,7 +250,21 @@ impl Arms {
 
     /// Brings both controllers back after a fault, a restart or a lost cable: hello, clear, home
     /// where needed.
+    /// What may pass, such as another fault on the way home, is got over too, a few times.
     pub(super) fn recover(&mut self) -> Result<(), HomeError> {
+        let mut tries_left = RECOVERIES;
+        loop {
+            match self.recover_once() {
+                Err(error) if tries_left > 0 && error.may_pass() => {
+                    tries_left -= 1;
+                    self.light.rest(PAUSE_US)?;
+                }
+                result => return result,
+            }
+        }
+    }
+
+    fn recover_once(&mut self) -> Result<(), HomeError> {
         let deadline_us = self.now_us() + RECONNECT_LIMIT_US;
         for controller in self.both() {
             let config = controller.identity().config_crc;
@@ -358,6 +376,33 @@ pub enum HomeError {
         "{0}: came back with other settings than the session began with; restore them and resume"
     )]
     OtherSettings(String),
+}
+
+impl HomeError {
+    /// Whether it may be gone at the next try. A person's stop, other settings, and what homing finds
+    /// wrong with the switch do not go away by themselves.
+    pub(super) fn may_pass(&self) -> bool {
+        match self {
+            HomeError::Fault(_, code) => matches!(
+                *code,
+                FaultCode::ENCODER_LOST
+                    | FaultCode::ENCODER_JUMP
+                    | FaultCode::FOLLOWING_ERROR
+                    | FaultCode::NOT_REACHED
+                    | FaultCode::LEASE_EXPIRED
+                    | FaultCode::STEPS_DISAGREE
+            ),
+            HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
+                refusal,
+                Refusal::NoSession | Refusal::State(State::Fault(_) | State::Boot)
+            ),
+            HomeError::Link(error) => matches!(
+                error,
+                LinkError::NoAnswer { .. } | LinkError::Endless { .. }
+            ),
+            HomeError::Stopped(_) | HomeError::OtherSettings(_) => false,
+        }
+    }
 }
 
 fn ended_badly(what: &str, outcome: Outcome) -> Try {
