@@ -82,6 +82,12 @@ fn day(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Day {
     arms.light().rest(wait_us).unwrap();
     let (mut kept, mut worst_deg) = (0, 0.0f64);
     let result = run_session(&mut arms, poses, &mut |outcome| {
+        if let ShotOutcome::Refused { index, reason } = &outcome {
+            println!(
+                "{:.0} s: pose {index} given up: {reason}",
+                rig.now_us() as f64 * 1e-6
+            );
+        }
         if let ShotOutcome::Kept(shot) = outcome {
             let truth = rig.true_pose_at_last_trigger().unwrap();
             let pose = poses[shot.index];

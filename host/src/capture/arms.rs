@@ -49,6 +49,8 @@ pub struct Arms {
     light: Controller,
     camera: Controller,
     phi_limits_deg: [[f64; 2]; 2],
+    /// An arm stands beyond its limits, where only homing helps, although it knows where it is.
+    pub(super) must_home: bool,
     /// The last target of each arm, µdeg: where φ is.
     at_udeg: [[i32; 2]; 2],
 }
@@ -78,6 +80,7 @@ impl Arms {
             light,
             camera,
             phi_limits_deg,
+            must_home: false,
             at_udeg: [[0; 2]; 2],
         })
     }
@@ -117,7 +120,10 @@ impl Arms {
     /// Events lost and requests repeated so far, of both arms.
     pub fn losses(&self) -> (u32, u32) {
         let (light, camera) = (self.light.losses(), self.camera.losses());
-        (light.0 + camera.0, light.1 + camera.1)
+        (
+            light.0.saturating_add(camera.0),
+            light.1.saturating_add(camera.1),
+        )
     }
 
     /// Changes how shots are taken.
@@ -136,8 +142,9 @@ impl Arms {
     /// Homes those arms that do not know where they are, both at once.
     pub fn home(&mut self) -> Result<(), HomeError> {
         let mut tickets = [None; 2];
+        let must_home = self.must_home;
         for (controller, ticket) in self.both().into_iter().zip(&mut tickets) {
-            if !controller.status()?.homed {
+            if must_home || !controller.status()?.homed {
                 *ticket = Some(controller.home()?);
             }
         }
@@ -151,6 +158,7 @@ impl Arms {
                 Some(_) => return Err(HomeError::Stopped(self.both()[i].name().to_owned())),
             }
         }
+        self.must_home = false;
         for (i, at) in [0, 1].into_iter().zip(self.positions_udeg()?) {
             self.at_udeg[i] = at;
         }

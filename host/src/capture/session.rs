@@ -155,7 +155,16 @@ fn take(
             })?;
         let tried = match arms.shoot(targets) {
             Ok(tried) => tried,
-            Err(error) => sort_error(index, error)?,
+            Err(error) => {
+                arms.must_home |= matches!(
+                    &error,
+                    LinkError::Refused {
+                        refusal: Refusal::StartBeyondLimit(_),
+                        ..
+                    }
+                );
+                sort_error(index, error)?
+            }
         };
         match tried {
             Try::Latched(latches) => {
