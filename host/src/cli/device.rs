@@ -257,7 +257,8 @@ fn print_place(arm: &mut Controller) -> Result<()> {
 }
 
 fn move_to(arm: &mut Controller, target_deg: [f64; 2]) -> Result<()> {
-    if target_deg.iter().any(|deg| !(deg.abs() <= 720.0)) {
+    let possible = -720.0..=720.0;
+    if !target_deg.iter().all(|deg| possible.contains(deg)) {
         bail!("{target_deg:?}: angles must lie in -720..=720 degrees");
     }
     let ticket = arm.move_to(target_deg.map(|deg| (deg * 1e6).round() as i32))?;
