@@ -44,9 +44,11 @@ impl FaultCode {
     pub const SETTINGS_DAMAGED: Self = Self(10);
     /// Settings could not be written to the board's memory.
     pub const SETTINGS_NOT_SAVED: Self = Self(11);
+    /// At rest, steps and encoder, both counted from home, disagree.
+    pub const STEPS_DISAGREE: Self = Self(12);
 
     /// Every fault that exists, in the order of its number.
-    pub const PAGES: [FaultPage; 11] = [
+    pub const PAGES: [FaultPage; 12] = [
         page(
             Self::ENCODER_LOST,
             "encoder does not answer",
@@ -112,6 +114,12 @@ impl FaultCode {
             "settings not saved",
             "flash write failed",
             "save again; replace the board if it returns",
+        ),
+        page(
+            Self::STEPS_DISAGREE,
+            "steps and encoder disagree at rest",
+            "steps lost, gear slipped, more backlash than backlash_takeup, or an encoder that shifted or was never calibrated",
+            "clear the fault, home: the switch tells which is right; if it returns, calibrate the encoder or raise backlash_takeup",
         ),
     ];
 

@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 21;
+pub const N_SETTINGS: usize = 26;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -47,8 +47,8 @@ pub enum Key {
     SoftMax = 4,
     /// Angle at which the home switch closes, coming from above, µdeg.
     HomeAngle = 5,
-    /// How far switch and encoder may disagree, µdeg. Below half a turn, so that the switch only
-    /// has to tell the turn.
+    /// How far switch and encoder may disagree, µdeg: what a good switch repeats to. Where it is wider
+    /// than the pointing limit, an encoder that has shifted is taken for right.
     HomeTolerance = 6,
     /// Highest speed, µdeg/s.
     MaxSpeed = 7,
@@ -79,6 +79,17 @@ pub enum Key {
     Lease = 19,
     /// Time between telemetry while moving, µs; 0 for none. Of the node: both axes share it.
     Telemetry = 20,
+    /// How far steps and encoder, both counted from home, may disagree at rest, µdeg. More means that
+    /// one of both is wrong, and only the home switch can tell which.
+    StepsDisagree = 21,
+    /// Error map of the encoder (see `gonia_firmware::error_map`): cosine, once a turn, µdeg.
+    EncoderCos1 = 22,
+    /// Sine, once a turn, µdeg.
+    EncoderSin1 = 23,
+    /// Cosine, twice a turn, µdeg.
+    EncoderCos2 = 24,
+    /// Sine, twice a turn, µdeg.
+    EncoderSin2 = 25,
 }
 
 /// What a key means.
@@ -149,7 +160,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "home_tolerance",
         "µdeg",
         (1000, 170 * DEG),
-        [DEG; 2],
+        [20_000; 2],
     ),
     m(
         Key::MaxSpeed,
@@ -237,7 +248,23 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         (0, 60_000_000),
         [500_000; 2],
     ),
+    m(
+        Key::StepsDisagree,
+        "steps_disagree",
+        "µdeg",
+        (5000, 10 * DEG),
+        [20_000; 2],
+    ),
+    map(Key::EncoderCos1, "encoder_cos1"),
+    map(Key::EncoderSin1, "encoder_sin1"),
+    map(Key::EncoderCos2, "encoder_cos2"),
+    map(Key::EncoderSin2, "encoder_sin2"),
 ];
+
+/// An amplitude of the encoder's error map.
+const fn map(key: Key, name: &'static str) -> Meaning {
+    m(key, name, "µdeg", (-500_000, 500_000), [0; 2])
+}
 
 const fn m(
     key: Key,
@@ -257,6 +284,14 @@ const fn m(
 }
 
 impl Key {
+    /// The keys of an encoder's error map. All zero: it was never calibrated.
+    pub const ERROR_MAP: [Key; 4] = [
+        Key::EncoderCos1,
+        Key::EncoderSin1,
+        Key::EncoderCos2,
+        Key::EncoderSin2,
+    ];
+
     /// The key of a number, if there is one.
     pub fn from_number(number: u8) -> Option<Self> {
         MEANINGS.get(number as usize).map(|meaning| meaning.key)

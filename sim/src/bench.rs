@@ -1,7 +1,7 @@
 //! Two axes behind the firmware's hardware trait: everything that one controller is wired to.
 
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::settings::STORED_LEN;
+use gonia_firmware::store::{RECORD_MAX, Sectors, Store, Stored};
 use gonia_protocol::settings::{Axis, Key};
 
 use crate::plant::{AxisPlant, PlantConfig};
@@ -15,7 +15,17 @@ pub struct Bench {
     rising_edges: u32,
     holds_interlock_open: bool,
     interlock_closed: bool,
-    flash: Option<[u8; STORED_LEN]>,
+    store: Store,
+    flash: RamFlash,
+}
+
+/// Two sectors that keep their bytes through a restart, until the power goes while one is written.
+#[derive(Debug)]
+struct RamFlash {
+    sectors: [[u8; RECORD_MAX]; 2],
+    /// The power goes after so many bytes of the next write.
+    dies_after: Option<usize>,
+    has_died: bool,
 }
 
 impl Bench {
@@ -32,7 +42,12 @@ impl Bench {
             rising_edges: 0,
             holds_interlock_open: false,
             interlock_closed: true,
-            flash: None,
+            store: Store::default(),
+            flash: RamFlash {
+                sectors: [[0xFF; RECORD_MAX]; 2],
+                dies_after: None,
+                has_died: false,
+            },
         }
     }
 
@@ -74,9 +89,21 @@ impl Bench {
         self.interlock_closed = closed;
     }
 
-    /// What the board's memory holds.
-    pub fn flash(&self) -> Option<&[u8]> {
-        self.flash.as_ref().map(|bytes| &bytes[..])
+    /// What a controller that starts finds in the board's memory.
+    pub fn open_store(&mut self) -> Option<Stored> {
+        let (store, stored) = Store::open(&mut self.flash);
+        self.store = store;
+        stored
+    }
+
+    /// The power will go after so many bytes of the next write to the board's memory.
+    pub fn die_while_saving(&mut self, after_bytes: usize) {
+        self.flash.dies_after = Some(after_bytes);
+    }
+
+    /// Whether the power has gone since the last call.
+    pub fn take_death(&mut self) -> bool {
+        core::mem::take(&mut self.flash.has_died)
     }
 
     /// Outputs fall back to what they are without a controller.
@@ -119,7 +146,33 @@ impl Hardware for Bench {
     }
 
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
-        self.flash = Some(bytes.try_into().map_err(|_| NotSaved)?);
+        self.store.save(&mut self.flash, bytes)
+    }
+}
+
+impl Sectors for RamFlash {
+    fn read(&mut self, sector: usize, out: &mut [u8]) -> Result<(), NotSaved> {
+        let from = self.sectors.get(sector).ok_or(NotSaved)?;
+        out.copy_from_slice(from.get(..out.len()).ok_or(NotSaved)?);
         Ok(())
+    }
+
+    fn erase(&mut self, sector: usize) -> Result<(), NotSaved> {
+        self.sectors.get_mut(sector).ok_or(NotSaved)?.fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, sector: usize, bytes: &[u8]) -> Result<(), NotSaved> {
+        let dies_after = self.dies_after.take();
+        let written = dies_after.map_or(bytes, |n| &bytes[..n.min(bytes.len())]);
+        let to = self.sectors.get_mut(sector).ok_or(NotSaved)?;
+        let to = to.get_mut(..written.len()).ok_or(NotSaved)?;
+        to.copy_from_slice(written);
+        self.has_died |= dies_after.is_some();
+        if dies_after.is_some() {
+            Err(NotSaved)
+        } else {
+            Ok(())
+        }
     }
 }

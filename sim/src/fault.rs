@@ -96,6 +96,22 @@ pub enum Fault {
         /// What it says.
         reading: Option<bool>,
     },
+    /// Readings of the encoder scatter, by so much (standard deviation).
+    EncoderNoise {
+        /// Of which axis.
+        axis: Axis,
+        /// How much.
+        udeg: f64,
+        /// How long, µs.
+        for_us: u64,
+    },
+    /// The home switch chatters for so long whenever it changes.
+    SwitchBounces {
+        /// Of which axis.
+        axis: Axis,
+        /// How long each time, µs.
+        bounce_us: u64,
+    },
     /// The interlock of both arms opens.
     InterlockOpen {
         /// How long, µs.
@@ -112,5 +128,15 @@ pub enum Fault {
     TriggerLost {
         /// How many pulses.
         pulses: u32,
+    },
+    /// The other arm sees the next pulse late.
+    TriggerLate {
+        /// By how much, µs.
+        by_us: u64,
+    },
+    /// The power goes during the next saving of settings.
+    TornSave {
+        /// After so many bytes.
+        after_bytes: usize,
     },
 }

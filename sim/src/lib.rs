@@ -4,8 +4,8 @@
 //! |---|---|
 //! | [`plant`] | motor, gear, shaft, encoder and switch of one axis (`no_std`) |
 //! | [`bench`](mod@bench) | two such axes behind the firmware's hardware trait (`no_std`) |
-//! | [`fault`] | what may go wrong, as data |
-//! | `wire` | bytes under way between host and controller |
+//! | [`fault`], [`random_faults`] | what may go wrong, as data; whole bad days by a seed |
+//! | [`wire`] | bytes under way between host and controller |
 //! | [`rig`] | two real controllers on their plants, in virtual time |
 //! | [`scene`] | what the camera sees |
 #![cfg_attr(not(feature = "std"), no_std)]
@@ -16,10 +16,12 @@ pub mod plant;
 #[cfg(feature = "std")]
 pub mod fault;
 #[cfg(feature = "std")]
+pub mod random_faults;
+#[cfg(feature = "std")]
 pub mod rig;
 #[cfg(feature = "std")]
 pub mod scene;
 #[cfg(feature = "std")]
-mod wire;
+pub mod wire;
 #[cfg(feature = "std")]
 mod world;

@@ -109,6 +109,8 @@ pub struct AxisPlant {
     stalled_until_us: u64,
     encoder_lost_until_us: u64,
     encoder_offset_udeg: f64,
+    extra_noise_udeg: f64,
+    noisy_until_us: u64,
     switch_stuck: Option<bool>,
     lost_cycles: u32,
 }
@@ -130,6 +132,8 @@ impl AxisPlant {
             stalled_until_us: 0,
             encoder_lost_until_us: 0,
             encoder_offset_udeg: 0.0,
+            extra_noise_udeg: 0.0,
+            noisy_until_us: 0,
             switch_stuck: None,
             lost_cycles: 0,
             config,
@@ -174,11 +178,13 @@ impl AxisPlant {
             return None;
         }
         let shaft = self.true_udeg(now_us);
+        let noisy = now_us < self.noisy_until_us;
+        let extra_noise_udeg = if noisy { self.extra_noise_udeg } else { 0.0 };
         let config = &self.config;
         let phase = TAU * ((shaft - config.eccentricity_phase_udeg) / 360e6);
         let seen = shaft
             + config.eccentricity_udeg * libm::sin(phase)
-            + config.encoder_noise_udeg * gaussian(&mut self.rng)
+            + libm::hypot(config.encoder_noise_udeg, extra_noise_udeg) * gaussian(&mut self.rng)
             + self.encoder_offset_udeg;
         let counts = libm::floor(seen * f64::from(config.encoder_counts) / 360e6 + 0.5);
         Some((counts as i64).rem_euclid(i64::from(config.encoder_counts)) as u32)
@@ -227,6 +233,17 @@ impl AxisPlant {
     /// The encoder is off by so much from now on.
     pub fn shift_encoder(&mut self, udeg: f64) {
         self.encoder_offset_udeg += udeg;
+    }
+
+    /// The encoder's readings scatter by so much more until then.
+    pub fn disturb_encoder_until(&mut self, until_us: u64, udeg: f64) {
+        self.noisy_until_us = until_us;
+        self.extra_noise_udeg = udeg;
+    }
+
+    /// From now on the switch chatters for so long whenever it changes.
+    pub fn wear_switch(&mut self, bounce_us: u64) {
+        self.config.bounce_us = bounce_us;
     }
 
     /// The shaft slips against the gear, or is knocked.

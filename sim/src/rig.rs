@@ -5,6 +5,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use gonia_brdf::direction::{Direction, Pose};
+use gonia_protocol::message::State;
 
 use crate::bench::Bench;
 pub use crate::fault::Arm;
@@ -36,6 +37,17 @@ impl TriggerRecord {
             view: direction(self.camera_deg),
         }
     }
+}
+
+/// An arm that has latched, or whose controller has restarted, has come to rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StopRecord {
+    /// Virtual time of its last step or of its latching, whichever came later, µs.
+    pub time_us: u64,
+    /// Which arm.
+    pub arm: Arm,
+    /// The state it is in; `Boot` after a restart.
+    pub state: State,
 }
 
 /// The simulated rig. Clones are the same rig.
@@ -80,6 +92,11 @@ impl SimRig {
     /// Every trigger pulse so far.
     pub fn triggers(&self) -> Vec<TriggerRecord> {
         lock(&self.world).triggers().to_vec()
+    }
+
+    /// Every time that an arm came to rest latched or by a restart, so far.
+    pub fn stops(&self) -> Vec<StopRecord> {
+        lock(&self.world).stops().to_vec()
     }
 
     /// The true angles of an arm now, degrees.

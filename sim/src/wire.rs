@@ -12,7 +12,7 @@ const BYTE_NS: u64 = 10_851;
 
 /// One direction of a serial line.
 #[derive(Debug)]
-pub(crate) struct Wire {
+pub struct Wire {
     under_way: VecDeque<(u64, u8)>,
     free_ns: u64,
     faults: WireFaults,
@@ -22,7 +22,8 @@ pub(crate) struct Wire {
 }
 
 impl Wire {
-    pub(crate) fn new(faults: WireFaults, seed: u64) -> Self {
+    /// A line with these faults. The same seed gives the same faults.
+    pub fn new(faults: WireFaults, seed: u64) -> Self {
         Self {
             under_way: VecDeque::new(),
             free_ns: 0,
@@ -34,7 +35,7 @@ impl Wire {
     }
 
     /// Puts bytes on the line.
-    pub(crate) fn send(&mut self, now_us: u64, bytes: &[u8]) {
+    pub fn send(&mut self, now_us: u64, bytes: &[u8]) {
         self.free_ns = self.free_ns.max(now_us * 1000);
         for &byte in bytes {
             self.free_ns += BYTE_NS;
@@ -47,12 +48,12 @@ impl Wire {
     }
 
     /// When the next byte arrives, µs.
-    pub(crate) fn next_us(&self) -> u64 {
+    pub fn next_us(&self) -> u64 {
         self.under_way.front().map_or(u64::MAX, |&(at, _)| at)
     }
 
     /// The next byte that has arrived by now.
-    pub(crate) fn take(&mut self, now_us: u64) -> Option<u8> {
+    pub fn take(&mut self, now_us: u64) -> Option<u8> {
         while self.next_us() <= now_us {
             let (at, byte) = self.under_way.pop_front()?;
             if at >= self.unplugged_until_us {
@@ -63,12 +64,12 @@ impl Wire {
     }
 
     /// The cable is out: whatever arrives before then is lost.
-    pub(crate) fn unplug_until(&mut self, until_us: u64) {
+    pub fn unplug_until(&mut self, until_us: u64) {
         self.unplugged_until_us = until_us;
     }
 
     /// Everything under way is lost.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.under_way.clear();
     }
 

@@ -1,14 +1,17 @@
 //! Both arms and their wires in virtual time. Between two events nothing is computed: the clock
 //! jumps.
 
+use std::collections::VecDeque;
+
 use gonia_firmware::controller::Controller;
 use gonia_firmware::node::Node;
-use gonia_protocol::message::{Identity, ResetReason};
+use gonia_firmware::store::Stored;
+use gonia_protocol::message::{Identity, ResetReason, State};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 
 use crate::bench::Bench;
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
-use crate::rig::TriggerRecord;
+use crate::rig::{StopRecord, TriggerRecord};
 use crate::wire::Wire;
 
 #[derive(Debug)]
@@ -20,6 +23,11 @@ struct ArmSim {
     to_host: Wire,
     boot_id: u32,
     lost_triggers: u32,
+    /// The next pulse is seen so much later, µs.
+    trigger_late_us: u64,
+    /// When the pulses that are late are seen.
+    late_edges_us: VecDeque<u64>,
+    is_safe: bool,
 }
 
 #[derive(Debug)]
@@ -30,6 +38,7 @@ pub(crate) struct World {
     next_event: usize,
     interlock_open_until_us: u64,
     triggers: Vec<TriggerRecord>,
+    stops: Vec<StopRecord>,
     trace: u64,
 }
 
@@ -37,16 +46,19 @@ impl World {
     pub(crate) fn new(seed: u64, mut plan: FaultPlan, benches: [Bench; 2]) -> Self {
         plan.events.sort_by_key(|event| event.at_us);
         let [light, camera] = benches;
-        let arm = |address: u8, bench: Bench| {
+        let arm = |address: u8, mut bench: Bench| {
             let wire_seed = seed.wrapping_add(u64::from(address) << 32);
             ArmSim {
                 address,
-                node: boot(address, 1, ResetReason::PowerOn, 0, None),
+                node: boot(address, 1, ResetReason::PowerOn, 0, bench.open_store()),
                 bench,
                 to_device: Wire::new(plan.wire, wire_seed),
                 to_host: Wire::new(plan.wire, wire_seed + 1),
                 boot_id: 1,
                 lost_triggers: 0,
+                trigger_late_us: 0,
+                late_edges_us: VecDeque::new(),
+                is_safe: false,
             }
         };
         Self {
@@ -56,6 +68,7 @@ impl World {
             next_event: 0,
             interlock_open_until_us: 0,
             triggers: Vec::new(),
+            stops: Vec::new(),
             trace: 0xCBF2_9CE4_8422_2325,
         }
     }
@@ -66,6 +79,10 @@ impl World {
 
     pub(crate) fn triggers(&self) -> &[TriggerRecord] {
         &self.triggers
+    }
+
+    pub(crate) fn stops(&self) -> &[StopRecord] {
+        &self.stops
     }
 
     pub(crate) fn trace(&self) -> u64 {
@@ -103,7 +120,7 @@ impl World {
         let next = self
             .arms
             .iter()
-            .map(|arm| arm.node.wake_us().min(arm.to_device.next_us()))
+            .map(ArmSim::next_us)
             .fold(limit_us.min(event_us), u64::min);
         self.now_us = self.now_us.max(next);
         if event_us <= self.now_us {
@@ -113,16 +130,17 @@ impl World {
         }
         for i in 0..2 {
             self.run_arm(i);
+            self.note_stop(i);
         }
     }
 
     fn run_arm(&mut self, i: usize) {
         let now_us = self.now_us;
         let arm = &mut self.arms[i];
-        let wakes = arm.node.wake_us() <= now_us;
-        if !wakes && arm.to_device.next_us() > now_us {
+        if arm.next_us() > now_us {
             return;
         }
+        let wakes = arm.node.wake_us() <= now_us;
         arm.bench.set_now(now_us);
         if wakes {
             let other_holds = self.arms[1 - i].bench.holds_interlock_open();
@@ -134,6 +152,14 @@ impl World {
         let arm = &mut self.arms[i];
         while let Some(byte) = arm.to_device.take(now_us) {
             arm.node.receive(byte, now_us, &mut arm.bench);
+            if arm.bench.take_death() {
+                self.restart(i);
+                return;
+            }
+        }
+        while arm.late_edges_us.front().is_some_and(|&at| at <= now_us) {
+            arm.late_edges_us.pop_front();
+            arm.node.trigger_edge(now_us, &mut arm.bench);
         }
         let edges = arm.bench.take_rising_edges();
         self.send_frames(i);
@@ -168,6 +194,11 @@ impl World {
             follower.lost_triggers -= 1;
             return;
         }
+        let late_us = std::mem::take(&mut follower.trigger_late_us);
+        if late_us > 0 {
+            follower.late_edges_us.push_back(now_us + late_us);
+            return;
+        }
         follower.bench.set_now(now_us);
         follower.node.trigger_edge(now_us, &mut follower.bench);
         self.send_frames(1 - source);
@@ -191,20 +222,75 @@ impl World {
                 arm.to_device.unplug_until(now_us + for_us);
                 arm.to_host.unplug_until(now_us + for_us);
             }
-            Fault::BrownOut => {
-                arm.boot_id += 1;
-                arm.bench.reset_outputs();
-                arm.to_device.clear();
-                arm.to_host.clear();
-                let (id, reset) = (arm.boot_id, ResetReason::BrownOut);
-                arm.node = boot(arm.address, id, reset, now_us, arm.bench.flash());
-            }
+            Fault::BrownOut => self.restart(i),
             Fault::TriggerLost { pulses } => arm.lost_triggers += pulses,
+            Fault::TriggerLate { by_us } => arm.trigger_late_us = by_us,
+            Fault::TornSave { after_bytes } => arm.bench.die_while_saving(after_bytes),
+            Fault::EncoderNoise { axis, udeg, for_us } => {
+                let plant = arm.bench.axis(axis);
+                plant.disturb_encoder_until(now_us + for_us, udeg);
+            }
+            Fault::SwitchBounces { axis, bounce_us } => {
+                arm.bench.axis(axis).wear_switch(bounce_us);
+            }
         }
+    }
+
+    /// The supply sags: the controller starts anew, and whatever was under way is lost.
+    fn restart(&mut self, i: usize) {
+        let now_us = self.now_us;
+        let arm = &mut self.arms[i];
+        arm.boot_id += 1;
+        arm.bench.reset_outputs();
+        arm.to_device.clear();
+        arm.to_host.clear();
+        let stored = arm.bench.open_store();
+        arm.node = boot(
+            arm.address,
+            arm.boot_id,
+            ResetReason::BrownOut,
+            now_us,
+            stored,
+        );
+        self.stops.push(StopRecord {
+            time_us: now_us,
+            arm: Arm::BOTH[i],
+            state: State::Boot,
+        });
+    }
+
+    /// Notes when an arm that has latched a fault comes to rest.
+    fn note_stop(&mut self, i: usize) {
+        let arm = &mut self.arms[i];
+        let controller = arm.node.controller();
+        let state = controller.state();
+        let is_safe = matches!(state, State::Fault(_) | State::EStop) && !controller.is_moving();
+        if is_safe && !arm.is_safe {
+            self.stops.push(StopRecord {
+                time_us: self.now_us,
+                arm: Arm::BOTH[i],
+                state,
+            });
+        }
+        arm.is_safe = is_safe;
     }
 }
 
-fn boot(address: u8, boot_id: u32, reset: ResetReason, now_us: u64, flash: Option<&[u8]>) -> Node {
+impl ArmSim {
+    /// When something happens on this arm next, µs.
+    fn next_us(&self) -> u64 {
+        let edge = self.late_edges_us.front().copied().unwrap_or(u64::MAX);
+        self.node.wake_us().min(self.to_device.next_us()).min(edge)
+    }
+}
+
+fn boot(
+    address: u8,
+    boot_id: u32,
+    reset: ResetReason,
+    now_us: u64,
+    stored: Option<Stored>,
+) -> Node {
     let identity = Identity {
         protocol_min: PROTOCOL_VERSION,
         protocol_max: PROTOCOL_VERSION,
@@ -217,5 +303,9 @@ fn boot(address: u8, boot_id: u32, reset: ResetReason, now_us: u64, flash: Optio
         reset,
         last_panic: Default::default(),
     };
-    Node::new(address, identity, Controller::new(now_us, flash))
+    Node::new(
+        address,
+        identity,
+        Controller::new(now_us, stored.as_deref()),
+    )
 }

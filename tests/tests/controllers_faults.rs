@@ -187,7 +187,7 @@ fn a_switch_that_lies_is_found_out_while_homing() {
 }
 
 #[test]
-fn lost_steps_and_a_slipping_gear_are_corrected_by_the_encoder() {
+fn after_lost_steps_or_a_slip_the_home_switch_says_that_the_encoder_is_right() {
     for fault in [
         Fault::LoseCycles {
             axis: Axis::Theta,
@@ -204,11 +204,56 @@ fn lost_steps_and_a_slipping_gear_are_corrected_by_the_encoder() {
         arm.rest(wait_us).unwrap();
         let ticket = arm.move_to([30_000_000, 0]).unwrap();
         let end = arm.wait(ticket, MINUTE_US).unwrap();
+        let disagree = FaultCode::STEPS_DISAGREE;
+        assert_eq!(end.outcome, Outcome::Failed(disagree), "{fault:?}");
+        arm.clear_fault().unwrap();
+        let ticket = arm.home().unwrap();
+        assert_eq!(
+            arm.wait(ticket, 4 * MINUTE_US).unwrap().outcome,
+            Outcome::Done
+        );
+        let ticket = arm.move_to([30_000_000, 0]).unwrap();
+        let end = arm.wait(ticket, MINUTE_US).unwrap();
         assert_eq!(end.outcome, Outcome::Done, "{fault:?}");
-        assert!(end.corrections[0] > 0);
-        assert!(arm.status().unwrap().axes[0].missed_steps > 0);
         assert!((rig.true_deg(Arm::Light)[0] - 30.0).abs() < 0.012);
     }
+}
+
+#[test]
+fn an_encoder_that_shifts_is_found_out_at_the_home_switch() {
+    for udeg in [60_000.0, -100_000.0, 170_000.0] {
+        let shift = Fault::EncoderJump {
+            axis: Axis::Phi,
+            udeg,
+        };
+        let rig = rig_with(&[(61_000_000, shift)]);
+        let mut arm = homed(&rig);
+        let wait_us = MINUTE_US - rig.now_us();
+        arm.rest(wait_us).unwrap();
+        let ticket = arm.move_to([0, 30_000_000]).unwrap();
+        let end = arm.wait(ticket, MINUTE_US).unwrap();
+        assert_eq!(end.outcome, Outcome::Failed(FaultCode::STEPS_DISAGREE));
+        arm.clear_fault().unwrap();
+        let ticket = arm.home().unwrap();
+        let end = arm.wait(ticket, 4 * MINUTE_US).unwrap();
+        assert_eq!(end.outcome, Outcome::Failed(FaultCode::HOME_MISMATCH));
+    }
+}
+
+#[test]
+fn power_lost_while_saving_leaves_the_old_settings() {
+    let torn = Fault::TornSave { after_bytes: 100 };
+    let rig = rig_with(&[(1_000_000, torn)]);
+    let mut arm = light(&rig);
+    let set = |arm: &mut Controller, value| arm.set_setting(Axis::Phi, Key::MaxSpeed, value);
+    set(&mut arm, 12_000_000).unwrap();
+    arm.save_settings().unwrap();
+    arm.rest(2_000_000).unwrap();
+    set(&mut arm, 13_000_000).unwrap();
+    assert_eq!(refusal(arm.save_settings()), Refusal::NoSession);
+    assert!(arm.reconnect().unwrap(), "the restart is noticed");
+    assert_eq!(arm.setting(Axis::Phi, Key::MaxSpeed).unwrap(), 12_000_000);
+    assert_eq!(state(&mut arm), State::Unhomed);
 }
 
 #[test]

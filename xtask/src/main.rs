@@ -1,5 +1,6 @@
 //! The project's own chores. `cargo xtask test` does all that a change must pass.
 
+mod size;
 mod steps;
 mod tools;
 
@@ -7,7 +8,9 @@ use std::process::ExitCode;
 
 const USAGE: &str = "\
 cargo xtask test    set up what the tests need, then fmt, clippy, boards, all tests
-cargo xtask boards  build the firmware of every board";
+cargo xtask boards  build the firmware of every board
+cargo xtask size    flash and RAM of every board against its budget
+cargo xtask fuzz    let the fuzzer loose on the protocol for a minute a target";
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
@@ -15,6 +18,8 @@ fn main() -> ExitCode {
     let outcome = match command.as_str() {
         "test" => steps::test(),
         "boards" => steps::boards(),
+        "size" => steps::size(),
+        "fuzz" => steps::fuzz(),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

@@ -1,15 +1,14 @@
 //! What the chores do, step by step.
 
+use crate::size::{budget_of, size_of};
 use crate::tools::{TARGET, add_target, install, run};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
 /// The board that runs in QEMU.
 const QEMU_BOARD: &str = "qemu-mps2";
-/// Its program.
-const QEMU_PROGRAM: &str = "gonia-qemu-mps2";
 
 /// All that a change must pass.
 pub fn test() -> Result<()> {
@@ -35,6 +34,7 @@ pub fn test() -> Result<()> {
         ]))
     })?;
     table.step("boards", || build_boards(&root))?;
+    table.step("size of the boards", || check_sizes(&root))?;
     table.step("tests", || run(cargo(&root).args(["test", "--workspace"])))?;
     if qemu {
         table.step("firmware in QEMU", || {
@@ -57,6 +57,72 @@ pub fn test() -> Result<()> {
 pub fn boards() -> Result<()> {
     add_target()?;
     build_boards(&root()?)
+}
+
+/// Prints what each board's program takes, and fails when one is over its budget.
+pub fn size() -> Result<()> {
+    add_target()?;
+    let root = root()?;
+    for board in board_folders(&root)? {
+        run(cargo(&board).args(["build", "--release"]))?;
+    }
+    check_sizes(&root)
+}
+
+fn check_sizes(root: &Path) -> Result<()> {
+    println!("{:<12} {:>9} {:>9}   budget", "board", "flash", "RAM");
+    let mut over = Vec::new();
+    for folder in board_folders(root)? {
+        let name = name_of(&folder);
+        let size = size_of(&program_of(&folder))?;
+        let verdict = match budget_of(&name) {
+            None => "none: it carries the simulated machine and ships nowhere".to_owned(),
+            Some(budget) => {
+                let is_within = size.is_within(budget);
+                if !is_within {
+                    over.push(name.clone());
+                }
+                let word = if is_within { "within" } else { "OVER" };
+                format!("{word} {} and {} bytes", budget.flash, budget.ram)
+            }
+        };
+        println!("{name:<12} {:>9} {:>9}   {verdict}", size.flash, size.ram);
+    }
+    if !over.is_empty() {
+        bail!(
+            "over budget: {}; make the firmware smaller",
+            over.join(", ")
+        );
+    }
+    Ok(())
+}
+
+/// Seconds that the fuzzer has for a target.
+const FUZZ_S: u32 = 60;
+
+/// Runs every fuzz target of the protocol for a while. Says so where the fuzzer is missing.
+pub fn fuzz() -> Result<()> {
+    let root = root()?;
+    let has_fuzzer = Command::new("cargo")
+        .args(["fuzz", "--version"])
+        .output()
+        .is_ok_and(|output| output.status.success());
+    let mut table = Table::default();
+    if !has_fuzzer {
+        table.not_run("fuzzing", "cargo-fuzz is missing: cargo install cargo-fuzz");
+        return Ok(());
+    }
+    for target in ["decoder", "link", "node"] {
+        table.step(&format!("fuzz {target}"), || {
+            let mut command = cargo(&root.join("protocol"));
+            // The sanitizer is a feature of the nightly compiler that the stable one has too.
+            command.env("RUSTC_BOOTSTRAP", "1");
+            let seconds = format!("-max_total_time={FUZZ_S}");
+            run(command.args(["fuzz", "run", target, "--", &seconds]))
+        })?;
+    }
+    table.print();
+    Ok(())
 }
 
 fn build_boards(root: &Path) -> Result<()> {
@@ -82,12 +148,22 @@ fn board_folders(root: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn qemu_elf(root: &Path) -> PathBuf {
-    root.join("firmware/boards")
-        .join(QEMU_BOARD)
+    program_of(&root.join("firmware/boards").join(QEMU_BOARD))
+}
+
+/// The program of a board: each is named after its folder.
+fn program_of(board: &Path) -> PathBuf {
+    let program = format!("gonia-{}", name_of(board));
+    board
         .join("target")
         .join(TARGET)
         .join("release")
-        .join(QEMU_PROGRAM)
+        .join(program)
+}
+
+fn name_of(board: &Path) -> String {
+    let name = board.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// Cargo in a folder, without what an outer cargo passed down: the boards choose their own target.

@@ -4,6 +4,7 @@ use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::AxisStatus;
 use gonia_protocol::settings::{Axis, Key};
 
+use crate::error_map::ErrorMap;
 use crate::hardware::Hardware;
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
 use crate::settings::Settings;
@@ -26,6 +27,8 @@ pub struct AxisDrive {
     steps: i64,
     base_steps: i64,
     base_udeg: i64,
+    /// Steps and encoder at home.
+    home: Option<(i64, i64)>,
     steps_per_turn: i64,
     encoder: Encoder,
     following_udeg: i32,
@@ -36,6 +39,9 @@ pub struct AxisDrive {
 /// The unwrapped encoder.
 #[derive(Debug, Default)]
 struct Encoder {
+    map: ErrorMap,
+    /// The count at 0°.
+    zero: i64,
     raw: Option<u32>,
     counts: i64,
     udeg: i32,
@@ -64,8 +70,13 @@ impl AxisDrive {
             steps: 0,
             base_steps: 0,
             base_udeg: 0,
+            home: None,
             steps_per_turn: i64::from(settings.get(axis, Key::StepsPerTurn)),
-            encoder: Encoder::default(),
+            encoder: Encoder {
+                map: ErrorMap::new(axis, settings),
+                zero: i64::from(settings.get(axis, Key::EncoderZero)),
+                ..Encoder::default()
+            },
             following_udeg: 0,
             corrections: 0,
             missed_steps: 0,
@@ -210,12 +221,11 @@ impl AxisDrive {
         let encoder = &mut self.encoder;
         let (counts, fault) = match hardware.encoder_counts(self.axis) {
             Ok(raw) if i64::from(raw) < turn => {
-                let zero = i64::from(settings.get(self.axis, Key::EncoderZero));
                 let Some(last_raw) = encoder.raw else {
                     // The first reading: somewhere within half a turn of 0, until homing knows better.
                     encoder.raw = Some(raw);
                     encoder.read_us = now_us;
-                    encoder.set_counts(wrap(i64::from(raw) - zero, turn), turn);
+                    encoder.set_counts(wrap(i64::from(raw) - encoder.zero, turn), turn);
                     return Ok(Reading::Fresh);
                 };
                 let moved = wrap(i64::from(raw) - i64::from(last_raw), turn);
@@ -269,6 +279,20 @@ impl AxisDrive {
         Ok(())
     }
 
+    /// The axis rests at home: steps and encoder count from here.
+    pub fn count_from_home(&mut self) {
+        self.home = Some((self.steps, i64::from(self.encoder.udeg)));
+    }
+
+    /// How far the encoder is ahead of the steps, both counted from home, µdeg. At rest, come to from
+    /// below, the gear's error and the encoder's are all that is in it.
+    pub fn disagreement_udeg(&self) -> i64 {
+        self.home.map_or(0, |(steps, udeg)| {
+            let turned = (self.steps - steps) * TURN_UDEG / self.steps_per_turn;
+            i64::from(self.encoder.udeg) - udeg - turned
+        })
+    }
+
     /// A ramp up to the speed of a key.
     pub fn ramp(&self, settings: &Settings, speed: Key) -> Ramp {
         Ramp::new(
@@ -286,6 +310,9 @@ impl AxisDrive {
     /// Takes up settings that may have changed. Only at rest.
     pub fn apply(&mut self, settings: &Settings) {
         self.steps_per_turn = i64::from(settings.get(self.axis, Key::StepsPerTurn));
+        self.encoder.map = ErrorMap::new(self.axis, settings);
+        self.encoder.zero = i64::from(settings.get(self.axis, Key::EncoderZero));
+        self.home = None;
         self.rebase();
         self.forget_encoder();
     }
@@ -310,7 +337,10 @@ impl AxisDrive {
 impl Encoder {
     fn set_counts(&mut self, counts: i64, turn: i64) {
         self.counts = counts;
-        self.udeg = (counts * TURN_UDEG).div_euclid(turn) as i32;
+        let place = |counts: i64| (((counts.rem_euclid(turn)) << 32) / turn) as u32;
+        let error =
+            self.map.error_udeg(place(counts + self.zero)) - self.map.error_udeg(place(self.zero));
+        self.udeg = (counts * TURN_UDEG).div_euclid(turn) as i32 - error;
     }
 }
 

@@ -26,8 +26,9 @@ pub const BUSY_TICK_US: u64 = 2_000;
 /// Control ticks at rest, µs.
 pub const REST_TICK_US: u64 = 20_000;
 const LOG_LEN: usize = 16;
-/// Start beyond a soft limit by less than this is the deadband's doing.
-const LIMIT_SLACK_UDEG: i32 = 100_000;
+/// Start beyond a soft limit by less than this is the doing of the deadband, or of the gear's play
+/// where homing parks.
+const LIMIT_SLACK_UDEG: i32 = 300_000;
 
 /// Two axes, their states, and what they were asked for.
 #[derive(Debug)]
@@ -94,6 +95,11 @@ impl Controller {
     /// What it is doing.
     pub fn state(&self) -> State {
         self.state
+    }
+
+    /// Whether steps are being given.
+    pub fn is_moving(&self) -> bool {
+        self.drives.iter().any(AxisDrive::is_moving)
     }
 
     /// The settings in use.
@@ -378,7 +384,8 @@ impl Controller {
         if matches!(
             key,
             Key::StepsPerTurn | Key::EncoderCountsPerTurn | Key::EncoderZero | Key::HomeAngle
-        ) {
+        ) || Key::ERROR_MAP.contains(&key)
+        {
             self.homed = false;
             self.enter(State::Unhomed, now_us);
             let drives = self.drives.iter_mut();
@@ -482,6 +489,7 @@ impl Controller {
         if self.homing.iter().flatten().all(Homing::is_done) {
             self.homed = true;
             self.homing = [None; 2];
+            self.drives.iter_mut().for_each(AxisDrive::count_from_home);
             self.target_udeg = Axis::BOTH.map(|axis| self.settings.get(axis, Key::SoftMin));
             self.enter(State::Idle, now_us);
             self.complete(Outcome::Done);
@@ -503,6 +511,10 @@ impl Controller {
             }
         }
         if reached {
+            if let Some(axis) = self.axis_in_disagreement() {
+                self.fault_unless_latched(now_us, FaultCode::STEPS_DISAGREE, Some(axis), hardware);
+                return;
+            }
             self.enter(State::Idle, now_us);
             self.complete(Outcome::Done);
         } else if self.drives.iter().any(AxisDrive::is_moving) {
@@ -510,6 +522,15 @@ impl Controller {
         } else {
             self.enter(State::Settling, now_us);
         }
+    }
+
+    /// The first axis whose steps and encoder tell of different places.
+    fn axis_in_disagreement(&self) -> Option<Axis> {
+        let disagrees = |drive: &&AxisDrive| {
+            let limit = self.settings.get(drive.axis(), Key::StepsDisagree);
+            drive.disagreement_udeg().abs() > i64::from(limit)
+        };
+        self.drives.iter().find(disagrees).map(AxisDrive::axis)
     }
 
     /// One axis after its run: whether it has reached its target, up to now.

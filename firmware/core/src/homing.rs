@@ -14,6 +14,8 @@ use crate::settings::Settings;
 const DEBOUNCE: u8 = 3;
 /// The slow way off the switch is this part of the fast search's speed.
 const CLEARING_SLOWDOWN: u64 = 4;
+/// Patiences of settling until an arm has swung out.
+const SWING_OUT: u64 = 3;
 /// How many back-offs below the switch an axis may stand at the start.
 const MAX_BELOW: i64 = 10;
 
@@ -35,6 +37,10 @@ enum Phase {
     Approach,
     /// Home is known; on to the lowest admissible angle.
     Park,
+    /// Until the arm has swung out: steps and encoder are compared from here on.
+    Rest {
+        until_us: u64,
+    },
     Done,
 }
 
@@ -117,7 +123,12 @@ impl Homing {
                 self.phase = Phase::Park;
             }
             Phase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
-            Phase::Park if !drive.is_moving() => self.phase = Phase::Done,
+            Phase::Park if !drive.is_moving() => {
+                let patience_us = settings.get_u64(drive.axis(), Key::SettlePatience);
+                let until_us = now_us + SWING_OUT * patience_us;
+                self.phase = Phase::Rest { until_us };
+            }
+            Phase::Rest { until_us } if now_us >= until_us => self.phase = Phase::Done,
             _ => {}
         }
         Ok(())

@@ -10,12 +10,14 @@
 //! | [`axis`] | one axis: steps, encoder, segments of a move |
 //! | [`profile`] | when the next step is due |
 //! | [`homing`], [`settle`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
-//! | [`settings`] | values of the settings, as bytes for flash too |
+//! | [`error_map`] | what the encoder reads wrong over a turn, and its removal |
+//! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
 //! | [`hardware`], [`pins`] | what a board must offer, and step/direction pins over `embedded-hal` |
 #![no_std]
 
 pub mod axis;
 pub mod controller;
+pub mod error_map;
 pub mod hardware;
 pub mod homing;
 pub mod node;
@@ -23,6 +25,7 @@ pub mod pins;
 pub mod profile;
 pub mod settings;
 pub mod settle;
+pub mod store;
 pub mod train;
 
 /// Version of this firmware: major, minor, patch.

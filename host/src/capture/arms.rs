@@ -7,7 +7,7 @@ use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
 use super::timing::nearest_turn_deg;
-use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport};
+use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport, is_uncalibrated};
 
 /// Longest homing: the whole travel of φ at the default search speed, and the slow approach, µs.
 const HOMING_LIMIT_US: u64 = 240_000_000;
@@ -17,6 +17,10 @@ const MOVE_LIMIT_US: u64 = 120_000_000;
 const FOLLOWER_LIMIT_US: u64 = 300_000;
 /// How long a controller that does not answer is asked again, µs.
 const RECONNECT_LIMIT_US: u64 = 60_000_000;
+
+/// How often bringing the arms back is tried again, and after which pause, µs.
+const RECOVERIES: u32 = 4;
+const PAUSE_US: u64 = 3_000_000;
 
 /// How a session takes its shots.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +49,8 @@ pub struct Arms {
     light: Controller,
     camera: Controller,
     phi_limits_deg: [[f64; 2]; 2],
+    /// An arm stands beyond its limits, where only homing helps, although it knows where it is.
+    pub(super) must_home: bool,
     /// The last target of each arm, µdeg: where φ is.
     at_udeg: [[i32; 2]; 2],
 }
@@ -74,6 +80,7 @@ impl Arms {
             light,
             camera,
             phi_limits_deg,
+            must_home: false,
             at_udeg: [[0; 2]; 2],
         })
     }
@@ -88,6 +95,23 @@ impl Arms {
         &mut self.camera
     }
 
+    /// The axes whose encoders have no error map: their true angle is not known to the pointing limit,
+    /// whatever the encoder says.
+    ///
+    /// # Errors
+    /// The link failed.
+    pub fn uncalibrated(&mut self) -> Result<Vec<(String, Axis)>, LinkError> {
+        let mut found = Vec::new();
+        for controller in self.both() {
+            for axis in Axis::BOTH {
+                if is_uncalibrated(controller, axis)? {
+                    found.push((controller.name().to_owned(), axis));
+                }
+            }
+        }
+        Ok(found)
+    }
+
     /// Now, by the arms' clock, µs: virtual on a simulated rig.
     pub fn now_us(&self) -> u64 {
         self.camera.now_us()
@@ -96,7 +120,10 @@ impl Arms {
     /// Events lost and requests repeated so far, of both arms.
     pub fn losses(&self) -> (u32, u32) {
         let (light, camera) = (self.light.losses(), self.camera.losses());
-        (light.0 + camera.0, light.1 + camera.1)
+        (
+            light.0.saturating_add(camera.0),
+            light.1.saturating_add(camera.1),
+        )
     }
 
     /// Changes how shots are taken.
@@ -115,8 +142,9 @@ impl Arms {
     /// Homes those arms that do not know where they are, both at once.
     pub fn home(&mut self) -> Result<(), HomeError> {
         let mut tickets = [None; 2];
+        let must_home = self.must_home;
         for (controller, ticket) in self.both().into_iter().zip(&mut tickets) {
-            if !controller.status()?.homed {
+            if must_home || !controller.status()?.homed {
                 *ticket = Some(controller.home()?);
             }
         }
@@ -130,6 +158,7 @@ impl Arms {
                 Some(_) => return Err(HomeError::Stopped(self.both()[i].name().to_owned())),
             }
         }
+        self.must_home = false;
         for (i, at) in [0, 1].into_iter().zip(self.positions_udeg()?) {
             self.at_udeg[i] = at;
         }
@@ -229,7 +258,21 @@ impl Arms {
 
     /// Brings both controllers back after a fault, a restart or a lost cable: hello, clear, home
     /// where needed.
+    /// What may pass, such as another fault on the way home, is got over too, a few times.
     pub(super) fn recover(&mut self) -> Result<(), HomeError> {
+        let mut tries_left = RECOVERIES;
+        loop {
+            match self.recover_once() {
+                Err(error) if tries_left > 0 && error.may_pass() => {
+                    tries_left -= 1;
+                    self.light.rest(PAUSE_US)?;
+                }
+                result => return result,
+            }
+        }
+    }
+
+    fn recover_once(&mut self) -> Result<(), HomeError> {
         let deadline_us = self.now_us() + RECONNECT_LIMIT_US;
         for controller in self.both() {
             let config = controller.identity().config_crc;
@@ -341,6 +384,33 @@ pub enum HomeError {
         "{0}: came back with other settings than the session began with; restore them and resume"
     )]
     OtherSettings(String),
+}
+
+impl HomeError {
+    /// Whether it may be gone at the next try. A person's stop, other settings, and what homing finds
+    /// wrong with the switch do not go away by themselves.
+    pub(super) fn may_pass(&self) -> bool {
+        match self {
+            HomeError::Fault(_, code) => matches!(
+                *code,
+                FaultCode::ENCODER_LOST
+                    | FaultCode::ENCODER_JUMP
+                    | FaultCode::FOLLOWING_ERROR
+                    | FaultCode::NOT_REACHED
+                    | FaultCode::LEASE_EXPIRED
+                    | FaultCode::STEPS_DISAGREE
+            ),
+            HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
+                refusal,
+                Refusal::NoSession | Refusal::State(State::Fault(_) | State::Boot)
+            ),
+            HomeError::Link(error) => matches!(
+                error,
+                LinkError::NoAnswer { .. } | LinkError::Endless { .. }
+            ),
+            HomeError::Stopped(_) | HomeError::OtherSettings(_) => false,
+        }
+    }
 }
 
 fn ended_badly(what: &str, outcome: Outcome) -> Try {

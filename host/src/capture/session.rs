@@ -114,8 +114,14 @@ fn take_all(
     on_shot: &mut dyn FnMut(ShotOutcome) -> Result<(), SessionError>,
     summary: &mut SessionSummary,
 ) -> Result<(), SessionError> {
-    arms.home()
-        .map_err(|source| SessionError::Arms { index: 0, source })?;
+    let homed = match arms.home() {
+        Err(error) if error.may_pass() => {
+            summary.recoveries += 1;
+            arms.recover()
+        }
+        result => result,
+    };
+    homed.map_err(|source| SessionError::Arms { index: 0, source })?;
     for (index, pose) in poses.iter().enumerate() {
         let outcome = take(arms, index, pose, summary)?;
         match &outcome {
@@ -149,7 +155,16 @@ fn take(
             })?;
         let tried = match arms.shoot(targets) {
             Ok(tried) => tried,
-            Err(error) => sort_error(index, error)?,
+            Err(error) => {
+                arms.must_home |= matches!(
+                    &error,
+                    LinkError::Refused {
+                        refusal: Refusal::StartBeyondLimit(_),
+                        ..
+                    }
+                );
+                sort_error(index, error)?
+            }
         };
         match tried {
             Try::Latched(latches) => {

@@ -3,6 +3,7 @@
 
 mod compare;
 mod demo;
+mod device;
 mod fill;
 mod plan;
 mod process;
@@ -10,6 +11,7 @@ mod progress;
 mod provenance;
 mod query;
 mod report;
+mod sim_device;
 mod table;
 
 use clap::{Parser, Subcommand};
@@ -42,6 +44,10 @@ enum Command {
     Compare(compare::Compare),
     /// One HTML file with pictures and figures of a measurement
     Report(report::Report),
+    /// Talk to the controller of an arm: identify, home, move, settings, calibration
+    Device(device::Device),
+    /// Simulated controllers on pseudo-terminals
+    SimDevice(sim_device::SimDevice),
 }
 
 /// Runs the command that the arguments name.
@@ -70,6 +76,8 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Report(command) => command.run(),
+        Command::Device(command) => command.run(),
+        Command::SimDevice(command) => command.run(),
     }
 }
 

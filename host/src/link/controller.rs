@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use gonia_protocol::frame::{Decoder, encode};
 use gonia_protocol::link::{Patience, Requester, Role, Wish};
 use gonia_protocol::message::{
-    Arm, Completed, Hello, Identity, Latch, Message, Move, Refusal, Setting, SettingName, Status,
-    Telemetry,
+    Arm, Completed, Hello, Identity, Latch, LogEntry, Message, Move, Refusal, Setting, SettingName,
+    Status, Telemetry,
 };
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_ANY, NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
@@ -199,6 +199,19 @@ impl Controller {
     pub fn save_settings(&mut self) -> Result<(), LinkError> {
         self.begin(&Message::SaveSettings, "saving the settings")
             .map(drop)
+    }
+
+    /// The faults that the controller remembers since it started, newest first.
+    pub fn log(&mut self) -> Result<Vec<LogEntry>, LinkError> {
+        let mut entries = Vec::new();
+        for back in 0..=u8::MAX {
+            match self.ask(&Message::ReadLog(back), "its log")?.1 {
+                Message::LogIs(entry) if entry.fault.is_none() => break,
+                Message::LogIs(entry) => entries.push(entry),
+                _ => return Err(self.confused("its log")),
+            }
+        }
+        Ok(entries)
     }
 
     /// Waits a while for something accepted to end; `None` if it has not. Renews the lease.
@@ -425,6 +438,8 @@ impl Controller {
         let gap = self
             .last_event
             .map_or(0, |last| seq.wrapping_sub(last).wrapping_sub(1));
+        // A number from before the last one: the controller has restarted, and counts anew.
+        let gap = if gap > u32::MAX / 2 { 0 } else { gap };
         self.events_lost = self.events_lost.saturating_add(gap);
         self.last_event = Some(seq);
         match event {

@@ -3,13 +3,17 @@
 //! [`Transport`] moves bytes, in real or in virtual time; [`Controller`] is one arm's controller as
 //! the host knows it. The protocol itself is `gonia-protocol`'s.
 
+mod calibrate;
 mod controller;
 mod error;
+mod error_map;
 mod stream;
 mod transport;
 
+pub use calibrate::{CalibrateError, calibrate_encoder, is_uncalibrated};
 pub use controller::{Controller, HEARTBEAT_US, Ticket};
 pub use error::LinkError;
+pub use error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
 pub use stream::StreamTransport;
 pub use transport::Transport;
 

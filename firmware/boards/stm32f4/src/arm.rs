@@ -4,10 +4,11 @@ use embassy_stm32::gpio::{Input, Output};
 use embassy_time::Delay;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::pins::StepDir;
+use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
 use crate::encoder::Encoder;
-use crate::store::Store;
+use crate::sectors::FlashSectors;
 
 /// A driver's pins.
 pub type Driver = StepDir<Output<'static>, Output<'static>, Delay>;
@@ -28,6 +29,8 @@ pub struct ArmPins {
     pub trigger: Output<'static>,
     /// Settings.
     pub store: Store,
+    /// Where they are kept.
+    pub sectors: FlashSectors,
 }
 
 impl Hardware for ArmPins {
@@ -57,6 +60,6 @@ impl Hardware for ArmPins {
     }
 
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
-        self.store.save(bytes)
+        self.store.save(&mut self.sectors, bytes)
     }
 }

@@ -20,7 +20,7 @@
 
 mod arm;
 mod encoder;
-mod store;
+mod sectors;
 
 use cortex_m::singleton;
 use defmt_rtt as _;
@@ -45,6 +45,7 @@ use embedded_io_async::{Read, Write};
 use gonia_firmware::controller::Controller;
 use gonia_firmware::node::Node;
 use gonia_firmware::pins::StepDir;
+use gonia_firmware::store::Store;
 use gonia_protocol::message::{Identity, ResetReason};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 use panic_persist as _;
@@ -52,7 +53,7 @@ use static_cell::StaticCell;
 
 use crate::arm::{ArmPins, Driver};
 use crate::encoder::Encoder;
-use crate::store::Store;
+use crate::sectors::FlashSectors;
 
 bind_interrupts!(struct Interrupts {
     USART2 => usart::BufferedInterruptHandler<peripherals::USART2>;
@@ -73,7 +74,8 @@ async fn main(spawner: Spawner) {
     let reset = take_reset_reason();
     let p = embassy_stm32::init(clocks());
 
-    let (store, settings) = Store::open(Flash::new_blocking(p.FLASH));
+    let mut sectors = FlashSectors(Flash::new_blocking(p.FLASH));
+    let (store, settings) = Store::open(&mut sectors);
     let output = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Medium);
     let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
     let address = match Input::new(p.PB0, Pull::Up).is_low() {
@@ -93,6 +95,7 @@ async fn main(spawner: Spawner) {
         interlock_relay: output(p.PC3.into()),
         trigger: output(p.PB5.into()),
         store,
+        sectors,
     };
     let trigger_in = ExtiInput::new(p.PC7, p.EXTI7, Pull::Down, Interrupts);
     match watch_trigger(trigger_in) {
@@ -115,7 +118,7 @@ async fn main(spawner: Spawner) {
     let (mut to_host, mut from_host) = uart.split();
 
     static NODE: StaticCell<Node> = StaticCell::new();
-    let controller = Controller::new(now_us(), settings.as_ref().map(|bytes| &bytes[..]));
+    let controller = Controller::new(now_us(), settings.as_deref());
     let node = NODE.init(Node::new(address, identity(reset), controller));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();

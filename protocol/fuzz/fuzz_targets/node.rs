@@ -1,0 +1,114 @@
+//! A whole controller: the fuzzer writes frames, noise, sensor readings and time. Nothing panics,
+//! and no step is given before homing.
+#![no_main]
+
+use gonia_firmware::controller::Controller;
+use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::node::Node;
+use gonia_protocol::frame::encode;
+use gonia_protocol::message::{Hello, Identity, Message, Move, ResetReason, Setting, State};
+use gonia_protocol::settings::Axis;
+use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+use libfuzzer_sys::fuzz_target;
+
+#[derive(Default)]
+struct Pins {
+    sensors: u8,
+    steps: u64,
+}
+
+impl Hardware for Pins {
+    fn step(&mut self, _: Axis, _: bool, _: u64) {
+        self.steps += 1;
+    }
+    fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
+        match self.sensors & 3 {
+            0 => Err(EncoderLost),
+            1 => Ok(u32::MAX),
+            _ => Ok(u32::from(self.sensors) << 10),
+        }
+    }
+    fn home_switch_closed(&mut self, _: Axis) -> bool {
+        self.sensors & 4 != 0
+    }
+    fn interlock_closed(&mut self) -> bool {
+        self.sensors & 0x38 != 0x38
+    }
+    fn hold_interlock_open(&mut self, _: bool) {}
+    fn set_trigger(&mut self, _: bool) {}
+    fn save_settings(&mut self, _: &[u8]) -> Result<(), NotSaved> {
+        if self.sensors & 0x40 == 0 { Ok(()) } else { Err(NotSaved) }
+    }
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let identity = Identity {
+        protocol_min: PROTOCOL_VERSION,
+        protocol_max: PROTOCOL_VERSION,
+        schema_key: SCHEMA_KEY,
+        firmware: [0; 3],
+        git: Default::default(),
+        board: Default::default(),
+        config_crc: 0,
+        boot_id: 0,
+        reset: ResetReason::Unknown,
+        last_panic: Default::default(),
+    };
+    let mut pins = Pins::default();
+    let mut node = Node::new(NODE_LIGHT, identity, Controller::new(0, None));
+    let (mut now_us, mut request) = (0u64, 0u16);
+    let mut may_move = false;
+    for chunk in bytes.chunks(6) {
+        let [deed, rest @ ..] = chunk else { continue };
+        let mut word = [0; 4];
+        for (to, from) in word.iter_mut().zip(rest) {
+            *to = *from;
+        }
+        let value = i32::from_le_bytes(word);
+        let message = match deed % 16 {
+            0 => Message::Hello(Hello { session: value as u32 }),
+            1 => Message::Home,
+            2 => Message::Move(Move { target_udeg: [value % 100_000_000, value] }),
+            3 => Message::Fire,
+            4 => Message::Stop,
+            5 => Message::EStop,
+            6 => Message::ClearFault,
+            7 => Message::SaveSettings,
+            8 => Message::SetSetting(Setting {
+                axis: Axis::Theta,
+                key: deed / 16 + word[0] % 16,
+                value,
+            }),
+            9 => {
+                pins.sensors = word[0];
+                continue;
+            }
+            10 => {
+                for byte in rest {
+                    node.receive(*byte, now_us, &mut pins);
+                }
+                continue;
+            }
+            11 => Message::Heartbeat,
+            _ => {
+                let until_us = now_us + u64::from(word[0]) * 1_000;
+                while node.wake_us() <= until_us {
+                    now_us = now_us.max(node.wake_us());
+                    node.poll(now_us, &mut pins);
+                    while node.take_frame().is_some() {}
+                }
+                now_us = until_us;
+                continue;
+            }
+        };
+        may_move |= matches!(message, Message::Home);
+        request = request.wrapping_add(1).max(1);
+        let frame = encode(NODE_LIGHT, request, &message).expect("short");
+        for &byte in &frame {
+            node.receive(byte, now_us, &mut pins);
+        }
+        while node.take_frame().is_some() {}
+    }
+    assert!(may_move || pins.steps == 0, "steps before homing");
+    assert!(may_move || node.controller().state() != State::Idle);
+});
