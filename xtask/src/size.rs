@@ -55,6 +55,7 @@ fn size_in(elf: &[u8]) -> Result<Size> {
     let mut size = Size::default();
     for i in 0..usize::from(count) {
         let at = table + i * usize::from(entry);
+        elf.get(at..at + usize::from(entry)).context("cut short")?;
         let (kind, flags) = (word(elf, at + 4)?, word(elf, at + 8)?);
         let length = u64::from(word(elf, at + 20)?);
         if flags & ALLOC == 0 {
