@@ -94,13 +94,15 @@ impl CsvTable {
         })
     }
 
-    /// Where an arm points in the current row: 0° ≤ θ < 90°, any finite φ.
+    /// Where an arm points in the current row: −1° < θ < 90°, any finite φ. An arm sent to its zero
+    /// may read a little to the other side of it; its azimuth, and with it the way the camera is
+    /// turned, is still φ.
     pub fn arm_direction(&self, theta: usize, phi: usize) -> Result<Direction, FileError> {
         let theta_deg: f64 = self.number(theta)?;
-        if !(0.0..90.0).contains(&theta_deg) {
+        if !(theta_deg > -1.0 && theta_deg < 90.0) {
             return Err(self.wrong(
                 format_args!("{} {theta_deg} is not an elevation", self.header[theta]),
-                "give degrees from the normal, from 0 to below 90",
+                "give degrees from the normal, from 0 (an arm's zero may read a little less) to below 90",
             ));
         }
         Ok(Direction::from_deg(theta_deg, self.finite(phi)?))
