@@ -81,18 +81,37 @@ fn start(cli: Cli) -> anyhow::Result<()> {
     }
 }
 
-/// The whole chain of causes on one line.
+/// The whole chain of causes on one line; a cause that is in the text already is not said again.
 fn one_line(error: &anyhow::Error) -> String {
-    format!("{error:#}")
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text: Vec<String> = cause
+            .to_string()
+            .split_whitespace()
+            .map(str::to_owned)
+            .collect();
+        let text = text.join(" ");
+        if !line.contains(&text) {
+            if !line.is_empty() {
+                line += ": ";
+            }
+            line += &text;
+        }
+    }
+    line
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::CommandFactory;
+
+    #[test]
+    fn an_error_says_nothing_twice() {
+        let inner = anyhow::anyhow!("a.exr: cannot be\nread");
+        let error = inner.context("frame 3: a.exr: cannot be read").context("b");
+        assert_eq!(one_line(&error), "b: frame 3: a.exr: cannot be read");
+    }
 
     #[test]
     fn every_command_has_help_with_an_example() {
