@@ -1,20 +1,18 @@
 //! Interpolation of a whole plan's samples, against the analytic truth: time by stage, and
 //! RMS of ln(f/f_true) over missing cells.
 //!
-//! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [--step 2] [--patch 4] [--nodes 128]`
+//! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8] [--nodes 128]`
 
 #![allow(clippy::expect_used)]
 
-use gonia_brdf::direction::local_direction;
-use gonia_brdf::hemisphere::{paper_lights, paper_views};
-use gonia_brdf::interpolate::{Settings, fill, select};
-use gonia_brdf::model::{Kurt, KurtLobe};
-use gonia_brdf::{Bins, Brdf, Direction, Grid, Sample};
+mod plan;
+
+use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::{Calibration, Preset, Settings, fill, fill_with_errors, select};
+use gonia_brdf::{Bins, Brdf, Grid};
+use plan::{cpu_seconds, material, measure};
 use rayon::prelude::*;
 use std::time::Instant;
-
-/// Standard deviation of the noise, relative.
-const NOISE: f64 = 0.015;
 
 fn main() {
     let arguments: Vec<String> = std::env::args()
@@ -48,12 +46,18 @@ fn main() {
         let bin_s = start.elapsed().as_secs_f64();
         let count = samples.len();
         drop(samples);
+        let preset = Preset::ALL
+            .into_iter()
+            .find(|p| arguments.iter().any(|a| a == p.name()))
+            .unwrap_or(Preset::Default)
+            .settings();
         let base = Settings {
-            patch_deg: option("--patch", Settings::DEFAULT.patch_deg),
-            nodes: option("--nodes", Settings::DEFAULT.nodes as f64) as usize,
-            range: option("--range", Settings::DEFAULT.range.into()) as f32,
-            nugget_min: option("--nugget", Settings::DEFAULT.nugget_min.into()) as f32,
-            ..Settings::DEFAULT
+            block_deg: option("--block", preset.block_deg),
+            tolerance: option("--tolerance", preset.tolerance.into()) as f32,
+            nodes: option("--nodes", preset.nodes as f64) as usize,
+            range: option("--range", preset.range.into()) as f32,
+            nugget_min: option("--nugget", preset.nugget_min.into()) as f32,
+            ..preset
         };
         let cpu = cpu_seconds();
         let selection = select(&bins, base);
@@ -68,6 +72,9 @@ fn main() {
         let (cpu, start) = (cpu_seconds(), Instant::now());
         let dense = fill(&bins, &selection.settings, &|_| ()).expect("enough bins");
         let (fill_cpu, fill_s) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
+        if arguments.iter().any(|a| a == "--errors") {
+            errors(&bins, &selection.settings, &*model);
+        }
         let mut measured = vec![false; grid.n_cells()];
         for bin in bins.bins() {
             let (i, v) = grid.light_and_view(bin.cell as usize);
@@ -87,63 +94,66 @@ fn main() {
     }
 }
 
-fn material(name: &str) -> Box<dyn Brdf> {
-    let lobe = |specular: f64, mx, my| KurtLobe {
-        specular: [specular, 0.8 * specular, 0.6 * specular],
-        f0: 0.05,
-        mx,
-        my,
-        alpha: 0.3,
-        azimuth_deg: 31.0,
-    };
-    Box::new(match name {
-        "matte" => Kurt::white_reference_fabric(),
-        "broad" => Kurt::new([0.2, 0.15, 0.1], &[lobe(2.0, 0.15, 0.4)]),
-        "sharp" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.05, 0.3)]),
-        "sharper" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.03, 0.12)]),
-        _ => Kurt::two_thread_fabric(),
-    })
-}
-
-/// The paper's plan on the paper's rig: 8505 frames of 1225 points, with noise.
-fn measure(model: &dyn Brdf) -> Vec<Sample> {
-    let (lights, views) = (paper_lights(), paper_views());
-    let points: Vec<[f64; 2]> = (-19..=19)
-        .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
-        .filter(|p| p[0].hypot(p[1]) <= 0.277)
-        .collect();
-    (0..lights.len() * views.len())
-        .into_par_iter()
-        .flat_map_iter(|frame| {
-            let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
-            let points = &points;
-            points.iter().enumerate().map(move |(k, point)| {
-                let l = local_direction(light, 1.1, *point);
-                let v = local_direction(view, 1.8, *point);
-                let value = model.eval(l, v);
-                let noise = [0, 1, 2].map(|c| 1.0 + NOISE * normal((frame * 1225 + k) * 3 + c));
-                let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-                Sample {
-                    theta_i_deg: l.theta_deg() as f32,
-                    phi_i_deg: l.phi_deg() as f32,
-                    theta_v_deg: v.theta_deg() as f32,
-                    phi_v_deg: v.phi_deg() as f32,
-                    rgb: [0, 1, 2].map(|c| (value[c] * noise[c]) as f32),
-                    frame: frame as u32,
+/// Error bars: time, and how many of the truths lie within the 95 % interval of their cell.
+fn errors(bins: &Bins, settings: &Settings, model: &dyn Brdf) {
+    let cpu = cpu_seconds();
+    let calibration = Calibration::new(bins, settings).expect("enough frames");
+    let calibrate_s = cpu_seconds() - cpu;
+    let (dense, bars) = fill_with_errors(bins, settings, &calibration, &|_| ()).expect("bins");
+    let fill_s = cpu_seconds() - cpu - calibrate_s;
+    println!("  error bars: calibration {calibrate_s:.1} CPU-s, fill {fill_s:.1} CPU-s");
+    let held_out = HoldOut::new(bins, settings.coordinates, 3, 24, 8000).expect("enough frames");
+    let predictions = held_out.predict(settings);
+    let share = |keep: &dyn Fn(f64, f64, f64) -> bool| {
+        let (mut inside, mut all) = (0, 0);
+        for p in &predictions {
+            let (i, v) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
+            let deg = |d: [f64; 3]| d[2].acos().to_degrees();
+            if keep(deg(i), deg(v), f64::from(p.bin.median[1]) * i[2] * v[2]) {
+                for covered in calibration.covers(p) {
+                    inside += usize::from(covered);
+                    all += 1;
                 }
-            })
-        })
-        .collect()
-}
-
-/// A nearly normal number from a counter: the sum of four uniform ones.
-fn normal(counter: usize) -> f64 {
-    let mut x = (counter as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d;
-    x ^= x >> 31;
-    x = x.wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x ^= x >> 28;
-    let sum: f64 = (0..4).map(|k| f64::from((x >> (16 * k)) as u16)).sum();
-    (sum / 65536.0 - 2.0) * 3f64.sqrt()
+            }
+        }
+        100.0 * inside as f64 / all.max(1) as f64
+    };
+    let mut weighted: Vec<f64> = predictions
+        .iter()
+        .map(|p| f64::from(p.bin.median[1] * p.bin.light[2] * p.bin.view[2]))
+        .collect();
+    weighted.sort_by(f64::total_cmp);
+    let bright = weighted[weighted.len() * 95 / 100];
+    println!(
+        "  held-out bins within 95 %: all {:.1}, interior {:.1}, grazing {:.1}, brightest 5 % {:.1}",
+        share(&|_, _, _| true),
+        share(&|i, v, _| i <= 75.0 && v <= 75.0),
+        share(&|i, v, _| i > 75.0 || v > 75.0),
+        share(&|_, _, w| w > bright),
+    );
+    let grid = bins.grid();
+    let n = grid.n_directions();
+    let mut count = [[0usize; 2]; 4];
+    for light in (0..n).step_by(7) {
+        for view in (light % 11..n).step_by(11) {
+            let cell = grid.cell(light, view);
+            let (i, v) = (grid.direction(light), grid.direction(view));
+            let truth = model.eval(i.to_vec3(), v.to_vec3());
+            let value = dense.at(light, view);
+            let row = &mut count[usize::from(bars.origin[cell])];
+            for c in 0..3 {
+                let relative = f64::from(bars.standard_error[c][cell] / value[c]);
+                let off = (f64::from(value[c]) / truth[c]).ln().abs();
+                row[0] += usize::from(off <= 1.96 * relative);
+                row[1] += 1;
+            }
+        }
+    }
+    let percent = count.map(|[inside, all]| 100.0 * inside as f64 / all.max(1) as f64);
+    println!(
+        "  truths within 95 %: measured {:.1}, reciprocal {:.1}, interpolated {:.1}, extrapolated {:.1}",
+        percent[0], percent[1], percent[2], percent[3]
+    );
 }
 
 fn log_rms(
@@ -175,17 +185,4 @@ fn log_rms(
         })
         .reduce(|| (0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     (sum / count.max(1) as f64).sqrt()
-}
-
-/// CPU seconds of all threads of this process so far.
-fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after_name = stat.rsplit(')').next().unwrap_or_default();
-    let field = |k: usize| {
-        after_name
-            .split_whitespace()
-            .nth(k)
-            .and_then(|f| f.parse::<f64>().ok())
-    };
-    (field(11).unwrap_or(f64::NAN) + field(12).unwrap_or(f64::NAN)) / 100.0
 }

@@ -4,10 +4,11 @@ use super::progress::Progress;
 use super::provenance::{Provenance, of_this_program};
 use super::table;
 use crate::dataset::dense_exr::write_dense;
+use crate::dataset::error_exr::write_error_bars;
 use crate::dataset::samples::read_samples;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::interpolate::{self, Settings};
+use gonia_brdf::interpolate::{self, Calibration, ErrorBars, Origin, Preset, Settings};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,9 @@ pub struct Fill {
     /// The dense BRDF to write (OpenEXR)
     #[arg(short, long, value_name = "DENSE.exr")]
     output: PathBuf,
+    /// Also write the standard error of each cell, and whether it was measured (OpenEXR)
+    #[arg(long, value_name = "ERR.exr")]
+    error: Option<PathBuf>,
     #[command(flatten)]
     how: How,
     /// What the samples' values are: relative, or absolute (1/sr)
@@ -35,12 +39,32 @@ pub struct How {
     /// Step of the grid in degrees
     #[arg(long, default_value_t = 2.0, value_name = "DEG")]
     pub step: f64,
-    /// Size of the blocks that share a factorisation, degrees [default: 4, or twice the step]
+    /// Speed against accuracy: a point of the front
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: PresetArgument,
+    /// Size of the blocks that share a factorisation, degrees [default: the preset's]
     #[arg(long, value_name = "DEG")]
     pub block: Option<f64>,
-    /// Neighbours a block
-    #[arg(long, default_value_t = Settings::DEFAULT.nodes, value_name = "N")]
-    pub nodes: usize,
+    /// Neighbours a block [default: the preset's]
+    #[arg(long, value_name = "N")]
+    pub nodes: Option<usize>,
+    /// Cut a block in finer ones where they differ by more than this many times the samples'
+    /// noise; 0 cuts all, inf none [default: the preset's]
+    #[arg(long, value_name = "T")]
+    pub tolerance: Option<f32>,
+}
+
+/// A preset on the command line.
+#[derive(clap::ValueEnum, Clone, Copy)]
+pub enum PresetArgument {
+    /// A first look, a few seconds
+    Preview,
+    /// Half the work of the default
+    Fast,
+    /// Accurate to the noise on most materials
+    Default,
+    /// The last of what is to be gained, at several times the work
+    Best,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy)]
@@ -53,21 +77,36 @@ impl How {
     /// Grid and starting settings; one line when they make no sense.
     pub fn check(&self) -> Result<(Grid, Settings)> {
         let grid = Grid::with_step_deg(self.step).context("--step")?;
-        let patch_deg = self.block.unwrap_or(f64::max(4.0, 2.0 * self.step));
-        if !(self.step..=45.0).contains(&patch_deg) {
+        let preset = match self.preset {
+            PresetArgument::Preview => Preset::Preview,
+            PresetArgument::Fast => Preset::Fast,
+            PresetArgument::Default => Preset::Default,
+            PresetArgument::Best => Preset::Best,
+        }
+        .settings();
+        let settings = Settings {
+            // Blocks of few cells share too little.
+            block_deg: self.block.unwrap_or(preset.block_deg.max(2.0 * self.step)),
+            nodes: self.nodes.unwrap_or(preset.nodes),
+            tolerance: self.tolerance.unwrap_or(preset.tolerance),
+            ..preset
+        };
+        if !(self.step..=45.0).contains(&settings.block_deg) {
             bail!(
-                "--block {patch_deg}: must lie between the step ({}) and 45 degrees",
+                "--block {}: must lie between the step ({}) and 45 degrees",
+                settings.block_deg,
                 self.step
             );
         }
-        if !(8..=1024).contains(&self.nodes) {
-            bail!("--nodes {}: must lie in 8..=1024", self.nodes);
+        if !(8..=1024).contains(&settings.nodes) {
+            bail!("--nodes {}: must lie in 8..=1024", settings.nodes);
         }
-        let settings = Settings {
-            patch_deg,
-            nodes: self.nodes,
-            ..Settings::DEFAULT
-        };
+        if settings.tolerance.is_nan() || settings.tolerance < 0.0 {
+            bail!(
+                "--tolerance {}: must be 0 or more, or inf",
+                settings.tolerance
+            );
+        }
         Ok((grid, settings))
     }
 }
@@ -76,6 +115,8 @@ impl How {
 pub struct Filled {
     /// The values.
     pub dense: DenseBrdf,
+    /// Standard errors, where asked for.
+    pub errors: Option<ErrorBars>,
     /// Cells with a sample, by number.
     pub cells: Vec<u32>,
     /// Samples that fell into a bin.
@@ -91,23 +132,38 @@ pub fn fill(
     samples: Vec<Sample>,
     grid: Grid,
     base: Settings,
+    with_errors: bool,
     progress: &mut Progress,
 ) -> Result<Filled> {
     let total = samples.len();
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
-    let selection = progress.stage("choosing settings", |_| {
-        anyhow::Ok(interpolate::select(&bins, base))
+    let settings = progress.stage("choosing settings", |_| {
+        anyhow::Ok(interpolate::select(&bins, base).settings)
     })?;
-    let dense = progress.stage("interpolating", |tell| {
-        interpolate::fill(&bins, &selection.settings, tell)
-    })?;
+    let (dense, errors) = if with_errors {
+        let calibration = progress.stage("calibrating error bars", |_| {
+            Calibration::new(&bins, &settings).context(
+                "too few frames to calibrate error bars: measure more poses, or leave --error out",
+            )
+        })?;
+        let (dense, errors) = progress.stage("interpolating", |tell| {
+            interpolate::fill_with_errors(&bins, &settings, &calibration, tell)
+        })?;
+        (dense, Some(errors))
+    } else {
+        let dense = progress.stage("interpolating", |tell| {
+            interpolate::fill(&bins, &settings, tell)
+        })?;
+        (dense, None)
+    };
     Ok(Filled {
         dense,
+        errors,
         cells: bins.bins().iter().map(|b| b.cell).collect(),
         binned: total - bins.outside(),
         outside: bins.outside(),
-        settings: selection.settings,
+        settings,
     })
 }
 
@@ -116,16 +172,26 @@ impl Fill {
     pub fn run(self) -> Result<()> {
         let (grid, base) = self.how.check()?;
         check_writable(folder_of(&self.output))?;
+        if let Some(error) = &self.error {
+            check_writable(folder_of(error))?;
+            if *error == self.output {
+                bail!(
+                    "--error {}: is the output too; give another name",
+                    error.display()
+                );
+            }
+        }
         let mut progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(&self.samples))?;
-        let filled = fill(samples, grid, base, &mut progress)
+        let filled = fill(samples, grid, base, self.error.is_some(), &mut progress)
             .with_context(|| self.samples.display().to_string())?;
+        let scale = match self.scale {
+            ScaleArgument::Relative => Scale::Relative,
+            ScaleArgument::Absolute => Scale::Absolute,
+        };
         let file = DenseFile {
             brdf: filled.dense,
-            scale: match self.scale {
-                ScaleArgument::Relative => Scale::Relative,
-                ScaleArgument::Absolute => Scale::Absolute,
-            },
+            scale,
             provenance: {
                 let mut facts = provenance_of(&filled.settings);
                 facts.insert("samples".into(), self.samples.display().to_string());
@@ -133,8 +199,24 @@ impl Fill {
             },
         };
         progress.stage("writing the dense BRDF", |_| {
-            write_dense(&self.output, file)
+            write_dense(&self.output, file).map(drop)
         })?;
+        let mut origins = Vec::new();
+        if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
+            let count = |o: Origin| bars.origin.iter().filter(|k| **k == o as u8).count();
+            let counts = [
+                ("cells measured", Origin::Measured),
+                ("cells by reciprocity", Origin::Reciprocal),
+                ("cells interpolated", Origin::Interpolated),
+                ("cells extrapolated", Origin::Extrapolated),
+            ]
+            .map(|(name, origin)| (name.to_owned(), table::count(count(origin) as u64)));
+            origins.extend(counts);
+            let facts = provenance_of(&filled.settings);
+            progress.stage("writing the error bars", |_| {
+                write_error_bars(path, grid, bars, scale, &facts)
+            })?;
+        }
         let mut rows = vec![
             (
                 "samples binned".to_owned(),
@@ -149,9 +231,12 @@ impl Fill {
                 table::count(filled.cells.len() as u64),
             ),
             ("cells".into(), table::count(grid.n_cells() as u64)),
+        ];
+        rows.extend(origins);
+        rows.extend([
             ("settings".into(), filled.settings.to_string()),
             ("written".into(), self.output.display().to_string()),
-        ];
+        ]);
         for stage in progress.stages() {
             rows.push((stage.name.clone(), format!("{:.1} s", stage.seconds)));
         }

@@ -58,16 +58,13 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
     } = file;
     let grid = brdf.grid();
     let side = grid.n_directions();
-    let mut attributes: BTreeMap<String, String> = provenance
-        .iter()
-        .map(|(name, text)| (format!("{PREFIX}{name}"), text.clone()))
-        .collect();
-    attributes.insert(SCALE.into(), scale.to_string());
+    let attributes = attributes_of(scale, &provenance);
     let planes = brdf.into_planes().map(Plane::F32);
     let image = ExrPlanes {
         width: side,
         height: side,
         planes,
+        extra: None,
         attributes,
     };
     let planes = exr_planes::write(path, image)?.map(Plane::into_f32);
@@ -77,6 +74,17 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
         scale,
         provenance,
     })
+}
+
+/// The text attributes of a file of gonia's.
+pub(super) fn attributes_of(
+    scale: Scale,
+    provenance: &BTreeMap<String, String>,
+) -> BTreeMap<String, String> {
+    let own = provenance
+        .iter()
+        .map(|(name, text)| (format!("{PREFIX}{name}"), text.clone()));
+    own.chain([(SCALE.to_owned(), scale.to_string())]).collect()
 }
 
 fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, FileError> {

@@ -20,6 +20,8 @@ pub(super) struct ExrPlanes {
     pub width: usize,
     pub height: usize,
     pub planes: [Plane; 3],
+    /// A channel beside R, G and B, by name: written, never read.
+    pub extra: Option<(&'static str, Plane)>,
     /// The text attributes of the file, by name.
     pub attributes: BTreeMap<String, String>,
 }
@@ -36,6 +38,15 @@ impl Plane {
         match self {
             Plane::F32(values) => values,
             Plane::F16(values) => values.into_iter().map(f16::to_f32).collect(),
+        }
+    }
+}
+
+impl From<Plane> for FlatSamples {
+    fn from(plane: Plane) -> Self {
+        match plane {
+            Plane::F16(values) => FlatSamples::F16(values),
+            Plane::F32(values) => FlatSamples::F32(values),
         }
     }
 }
@@ -102,6 +113,7 @@ pub(super) fn read(
         width,
         height,
         planes,
+        extra: None,
         attributes,
     })
 }
@@ -153,12 +165,11 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
         width,
         height,
         planes,
+        extra,
         attributes,
     } = image;
-    let [r, g, b] = planes.map(|plane| match plane {
-        Plane::F16(values) => FlatSamples::F16(values),
-        Plane::F32(values) => FlatSamples::F32(values),
-    });
+    let [r, g, b] = planes.map(FlatSamples::from);
+    let extra = extra.map(|(name, plane)| (name, FlatSamples::from(plane)));
     let mut layer_attributes = LayerAttributes {
         software_name: Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION"))),
         ..LayerAttributes::default()
@@ -183,6 +194,7 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
     let channels = AnyChannels::sort(
         [("R", r), ("G", g), ("B", b)]
             .into_iter()
+            .chain(extra)
             .map(|(name, samples)| AnyChannel::new(name, samples))
             .collect(),
     );

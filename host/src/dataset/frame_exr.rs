@@ -113,6 +113,7 @@ pub fn write_frame(path: &Path, frame: &Frame) -> Result<(), FileError> {
             width: frame.width,
             height: frame.height,
             planes,
+            extra: None,
             attributes: BTreeMap::new(),
         },
     )

@@ -9,6 +9,7 @@ pub mod cell_mask;
 mod csv_table;
 pub mod dense_exr;
 pub mod error;
+pub mod error_exr;
 mod exr_planes;
 pub mod frame;
 pub mod frame_exr;

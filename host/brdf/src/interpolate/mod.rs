@@ -9,26 +9,33 @@
 pub mod block;
 pub mod cholesky;
 pub mod coordinates;
+pub mod error_bars;
 pub mod fill;
-pub mod neighbours;
+pub mod hold_out;
+pub mod levels;
 pub mod nodes;
 pub mod patches;
+pub mod refine;
 pub mod select;
 
 pub use coordinates::Coordinates;
-pub use fill::{FillError, fill};
+pub use error_bars::{Calibration, ErrorBars, Origin};
+pub use fill::{FillError, fill, fill_with_errors};
 pub use select::{Selection, Trial, select};
 
 /// How to interpolate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Size of the patches of directions, degrees.
-    pub patch_deg: f64,
+    /// Size of the patches of directions that share a block, degrees; half of it where they are cut.
+    pub block_deg: f64,
+    /// A block is cut where a finer one differs from it by more than this many standard deviations
+    /// of one sample: 0 cuts everywhere, infinity nowhere.
+    pub tolerance: f32,
     /// Nodes a block.
     pub nodes: usize,
     /// Where distances are taken.
     pub coordinates: Coordinates,
-    /// Range of the kernel in radii of the neighbourhood.
+    /// Range of the kernel in radii of the neighbourhood; at least 2.
     pub range: f32,
     /// Variance of the natural logarithm of one sample.
     pub noise_variance: f32,
@@ -36,16 +43,65 @@ pub struct Settings {
     pub nugget_min: f32,
 }
 
+/// Points of the front of speed against accuracy; docs/results.md has their figures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// A first look.
+    Preview,
+    /// Half the work of the default.
+    Fast,
+    /// Accurate to the noise on most materials.
+    Default,
+    /// What is left to gain, for several times the work.
+    Best,
+}
+
+impl Preset {
+    /// All, from quick to accurate.
+    pub const ALL: [Preset; 4] = [Preset::Preview, Preset::Fast, Preset::Default, Preset::Best];
+
+    /// Its word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Preview => "preview",
+            Preset::Fast => "fast",
+            Preset::Default => "default",
+            Preset::Best => "best",
+        }
+    }
+
+    /// Its settings; [`select`] chooses the coordinates and measures the noise.
+    pub const fn settings(self) -> Settings {
+        let (block_deg, tolerance, nodes) = match self {
+            Preset::Preview => (16.0, f32::INFINITY, 32),
+            Preset::Fast => (8.0, 2.0, 64),
+            Preset::Default => (8.0, 1.0, 128),
+            Preset::Best => (8.0, 0.5, 256),
+        };
+        Settings {
+            block_deg,
+            tolerance,
+            nodes,
+            coordinates: Coordinates::HalfDifference { weight: 0.5 },
+            range: 8.0,
+            noise_variance: 1e-4,
+            nugget_min: 1e-4,
+        }
+    }
+}
+
 impl Settings {
     /// What suits most materials; [`select`] finds what suits one.
-    pub const DEFAULT: Settings = Settings {
-        patch_deg: 4.0,
-        nodes: 128,
-        coordinates: Coordinates::HalfDifference { weight: 0.5 },
-        range: 8.0,
-        noise_variance: 1e-4,
-        nugget_min: 1e-4,
-    };
+    pub const DEFAULT: Settings = Preset::Default.settings();
+
+    /// Sizes of the patches, coarse to fine, degrees.
+    fn patch_sizes_deg(&self) -> Vec<f64> {
+        if self.tolerance.is_finite() {
+            vec![self.block_deg, 0.5 * self.block_deg]
+        } else {
+            vec![self.block_deg]
+        }
+    }
 
     fn block(&self) -> block::BlockSettings {
         block::BlockSettings {
@@ -60,8 +116,9 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "blocks of {} deg, {} nodes, {}, range {} radii, noise {:.2} %, nugget at least {:e}",
-            self.patch_deg,
+            "blocks of {} deg, tolerance {} noise, {} nodes, {}, range {} radii, noise {:.2} %, nugget at least {:e}",
+            self.block_deg,
+            self.tolerance,
             self.nodes,
             self.coordinates,
             self.range,

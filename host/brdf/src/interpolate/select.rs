@@ -1,21 +1,20 @@
 //! Which settings suit a material: cross-validation over held-out frames.
-//!
-//! Holding out single bins tells nothing, because a bin's neighbours come from the same frame;
-//! whole frames are what is missing between the measured directions.
 
 use super::Settings;
-use super::block::BlockSolver;
 use super::coordinates::Coordinates;
-use super::neighbours::Neighbours;
-use super::nodes::{log_noise_variance, nodes_of};
-use crate::bins::{Bin, Bins};
-use crate::sample::Sample;
-use rayon::prelude::*;
+use super::hold_out::{HoldOut, Prediction};
+use super::nodes::log_noise_variance;
+use crate::bins::Bins;
 
-/// Held-out bins that are predicted, at most.
-const TESTS: usize = 4000;
+/// Held-out bins that are predicted, at most, over all sets.
+const TESTS: usize = 1200;
 /// One frame in so many is held out.
-const HOLD_OUT: u32 = 32;
+const HOLD_OUT: u32 = 24;
+/// With fewer bins than this the choice is a near tie that one set of frames would decide by chance;
+/// several are cheap then.
+const MANY_BINS: usize = 1_000_000;
+/// Sets of frames held out in turn, where there are few bins.
+const SETS: u32 = 4;
 /// The systems of coordinates that compete.
 const CANDIDATES: [Coordinates; 4] = [
     Coordinates::HalfDifference { weight: 0.5 },
@@ -29,7 +28,7 @@ const CANDIDATES: [Coordinates; 4] = [
 pub struct Trial {
     /// The settings tried.
     pub settings: Settings,
-    /// RMS of the natural logarithm of predicted over measured, trimmed by the worst 1 %.
+    /// RMS of the natural logarithm of predicted over measured, the samples' noise included.
     pub log_rms: f64,
 }
 
@@ -43,40 +42,39 @@ pub struct Selection {
 }
 
 /// Estimates the noise from the spread inside bins, then tries the candidate coordinates on frames
-/// held out. Without frame numbers, or with too few frames, `base` keeps its coordinates.
+/// (or, without frame numbers, clusters of directions) held out. With too few of them, `base` keeps
+/// its coordinates.
 pub fn select(bins: &Bins, base: Settings) -> Selection {
     let mut settings = base;
     if let Some(variance) = log_noise_variance(bins.bins().iter()) {
         settings.noise_variance = variance;
     }
-    let held_out = |bin: &&Bin| hash(bin.frame).is_multiple_of(HOLD_OUT);
-    let known = |bin: &&Bin| bin.frame != Sample::NO_FRAME;
-    let candidates: Vec<&Bin> = bins.bins().iter().filter(known).filter(held_out).collect();
-    let tests: Vec<&Bin> = candidates
-        .iter()
-        .step_by(candidates.len().div_ceil(TESTS).max(1))
-        .copied()
-        .collect();
-    if tests.len() < 100 {
-        return Selection {
-            settings,
-            trials: Vec::new(),
+    let sets = if bins.bins().len() < MANY_BINS {
+        SETS
+    } else {
+        1
+    };
+    let tests = TESTS / sets as usize;
+    let candidates = CANDIDATES.map(|coordinates| Settings {
+        coordinates,
+        ..settings
+    });
+    let mut squares = CANDIDATES.map(|_| Vec::new());
+    for set in 0..sets {
+        let Some(held_out) = HoldOut::new(bins, CANDIDATES[0], set, HOLD_OUT, tests) else {
+            continue;
         };
+        for (candidate, squares) in candidates.iter().zip(&mut squares) {
+            squares.extend(held_out.predict(candidate).iter().map(weighted_square));
+        }
     }
-    // Bins of several frames may hold a part of a held-out frame, so none of them takes part.
-    let training = bins.bins().iter().filter(known).filter(|b| !held_out(b));
-    let trials: Vec<Trial> = CANDIDATES
-        .iter()
-        .map(|coordinates| {
-            let settings = Settings {
-                coordinates: *coordinates,
-                ..settings
-            };
-            let neighbours = Neighbours::new(nodes_of(training.clone(), *coordinates));
-            Trial {
-                settings,
-                log_rms: log_rms_at(&tests, &neighbours, &settings),
-            }
+    let trials: Vec<Trial> = candidates
+        .into_iter()
+        .zip(squares)
+        .filter(|(_, squares)| !squares.is_empty())
+        .map(|(settings, squares)| Trial {
+            settings,
+            log_rms: rms(&squares),
         })
         .collect();
     if let Some(best) = trials.iter().min_by(|a, b| a.log_rms.total_cmp(&b.log_rms)) {
@@ -85,44 +83,19 @@ pub fn select(bins: &Bins, base: Settings) -> Selection {
     Selection { settings, trials }
 }
 
-/// RMS over the tests of the log error, each predicted from its own neighbourhood.
-fn log_rms_at(tests: &[&Bin], neighbours: &Neighbours, settings: &Settings) -> f64 {
-    let mut squares: Vec<f64> = tests
-        .par_iter()
-        .map_init(
-            || (BlockSolver::default(), Vec::new(), Vec::new()),
-            |(solver, found, values), bin| {
-                let point = settings
-                    .coordinates
-                    .point(bin.light.map(f64::from), bin.view.map(f64::from));
-                let radius = neighbours.gather(&point, settings.nodes, found);
-                let nodes = neighbours.nodes();
-                let block = settings.block();
-                solver.fit(
-                    found.iter().map(|(_, k)| &nodes[*k as usize]),
-                    radius,
-                    &block,
-                );
-                values.clear();
-                solver.evaluate(&[point], values);
-                let log = values[0];
-                (0..3)
-                    .filter(|c| bin.median[*c] > 0.0)
-                    .map(|c| f64::from(log[c] - bin.median[c].ln()).powi(2))
-                    .sum::<f64>()
-                    / 3.0
-            },
-        )
-        .collect();
-    // A few outliers must not decide.
-    squares.sort_by(f64::total_cmp);
-    squares.truncate(squares.len() - squares.len() / 100);
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+/// A residual beyond this is no better known: an outlier must not decide.
+const RESIDUAL_MAX: f32 = 1.0;
+
+/// Weight and mean square residual of a prediction.
+fn weighted_square(prediction: &Prediction) -> (f64, f64) {
+    let squares = (0..3)
+        .filter_map(|c| prediction.residual(c))
+        .map(|r| f64::from(r.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)).powi(2));
+    (f64::from(prediction.weight), squares.sum::<f64>() / 3.0)
 }
 
-/// Spreads frame numbers, so that held-out frames are no regular pattern of the plan.
-fn hash(frame: u32) -> u32 {
-    let mut x = u64::from(frame).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    x ^= x >> 29;
-    (x.wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
+fn rms(squares: &[(f64, f64)]) -> f64 {
+    let sum: f64 = squares.iter().map(|(weight, square)| weight * square).sum();
+    let weights: f64 = squares.iter().map(|(weight, _)| weight).sum();
+    (sum / weights).sqrt()
 }

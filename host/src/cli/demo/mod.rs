@@ -4,7 +4,7 @@
 mod session;
 mod summary;
 
-use super::fill::{self, How, fill};
+use super::fill::{self, How, PresetArgument, fill};
 use super::plan::travelling;
 use super::process;
 use super::progress::Progress;
@@ -24,7 +24,6 @@ use crate::report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use crate::report::{ReportInput, write_report, write_sphere};
 use anyhow::{Result, bail};
 use gonia_brdf::DenseBrdf;
-use gonia_brdf::interpolate::Settings;
 use gonia_brdf::model::Kurt;
 use gonia_sim::scene::Scene;
 use std::path::PathBuf;
@@ -70,8 +69,10 @@ impl Demo {
         let keep_frames = self.keep_frames || self.quick;
         let (grid, settings) = How {
             step,
+            preset: PresetArgument::Default,
             block: None,
-            nodes: Settings::DEFAULT.nodes,
+            nodes: None,
+            tolerance: None,
         }
         .check()?;
         check_writable(&self.out)?;
@@ -106,7 +107,7 @@ impl Demo {
         })?;
         let frame_rows = process::describe(&processed);
         let mut summary = summary::start(&session, &processed, plan.poses.len());
-        let filled = fill(processed.samples, grid, settings, &mut progress)?;
+        let filled = fill(processed.samples, grid, settings, false, &mut progress)?;
         summary
             .provenance
             .extend(fill::provenance_of(&filled.settings));

@@ -1,0 +1,248 @@
+//! Standard errors: of measured cells from the spread inside bins, of all others from the variance
+//! of the blocks, calibrated on bins held out.
+//!
+//! A block's own variance is a guess: it rests on one kernel and on few nodes. How far off it is,
+//! is measured on held-out bins, class by class (elevation, and size of the guess): each class gets
+//! the factor with which 95 % of its bins lie within 1.96 standard errors.
+
+use super::Settings;
+use super::hold_out::{HoldOut, Prediction};
+use super::nodes::SIGMA_PER_MAD;
+use crate::bins::{Bin, Bins};
+use crate::direction::Vec3;
+use crate::grid::Grid;
+
+/// Half the width of a 95 % interval, in standard errors of a normal distribution.
+pub const Z95: f32 = 1.96;
+/// Held-out bins that are predicted, at most.
+const TESTS: usize = 12_000;
+/// One frame in so many is held out.
+const ONE_IN: u32 = 24;
+/// Classes by size of the guess, for each of the two classes by elevation.
+const SIZES: usize = 8;
+/// Elevations above this are a class of their own: views end there, degrees.
+const GRAZING_DEG: f64 = 75.0;
+/// Standard error of a median of normal values over that of their mean.
+const MEDIAN_OVER_MEAN: f32 = 1.2533;
+/// So many samples tell their own spread; fewer take the material's.
+const COUNT_MIN: u32 = 6;
+
+/// Where a cell's value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Origin {
+    /// Samples fell into the cell.
+    Measured = 0,
+    /// Samples fell into the cell with light and view exchanged.
+    Reciprocal = 1,
+    /// Between measured directions.
+    Interpolated = 2,
+    /// Beyond all measured pairs of elevations: a guess, however small its error seems.
+    Extrapolated = 3,
+}
+
+/// Standard errors of a dense BRDF.
+#[derive(Clone, Debug)]
+pub struct ErrorBars {
+    /// Standard error per channel, in the unit of the values, cell by cell.
+    pub standard_error: [Vec<f32>; 3],
+    /// An [`Origin`] a cell.
+    pub origin: Vec<u8>,
+}
+
+/// What turns a block's variance into a standard error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    interior: Classes,
+    grazing: Classes,
+    noise_variance: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Classes {
+    /// Upper limits of the guessed standard deviation, ascending, of all classes but the last.
+    limits: Vec<f32>,
+    /// By what the guess is multiplied.
+    factors: Vec<f32>,
+}
+
+impl Calibration {
+    /// Calibrates on bins held out. `None` when too few frames (or clusters of directions) are there
+    /// to hold any out.
+    pub fn new(bins: &Bins, settings: &Settings) -> Option<Self> {
+        let held_out = HoldOut::new(bins, settings.coordinates, 7, ONE_IN, TESTS)?;
+        Some(Self::from_predictions(
+            &held_out.predict(settings),
+            settings.noise_variance,
+        ))
+    }
+
+    /// Calibrates on predictions of bins that took no part in the fit.
+    pub fn from_predictions(predictions: &[Prediction], noise_variance: f32) -> Self {
+        let (grazing, interior): (Vec<&Prediction>, Vec<&Prediction>) = predictions
+            .iter()
+            .partition(|p| is_grazing(p.bin.light.map(f64::from), p.bin.view.map(f64::from)));
+        let all: Vec<&Prediction> = predictions.iter().collect();
+        let classes = |part: Vec<&Prediction>| {
+            let part = if part.len() < 40 * SIZES { &all } else { &part };
+            Classes::new(part, noise_variance)
+        };
+        Self {
+            interior: classes(interior),
+            grazing: classes(grazing),
+            noise_variance,
+        }
+    }
+
+    /// Standard error of the logarithm, per channel, from a block's variance.
+    pub fn standard_error(&self, light: Vec3, view: Vec3, variance: [f32; 3]) -> [f32; 3] {
+        let classes = if is_grazing(light, view) {
+            &self.grazing
+        } else {
+            &self.interior
+        };
+        let factor = classes.factor(size(variance));
+        variance.map(|v| factor * v.max(0.0).sqrt())
+    }
+
+    /// Standard error of the logarithm of a measured cell: of the median of its samples.
+    pub fn of_measured(&self, bin: &Bin) -> [f32; 3] {
+        [0, 1, 2].map(|c| {
+            let own = SIGMA_PER_MAD * bin.mad[c] / bin.median[c].abs();
+            let usual = self.noise_variance.sqrt();
+            let sigma = if bin.count >= COUNT_MIN && own.is_finite() {
+                own.max(0.3 * usual)
+            } else {
+                usual
+            };
+            let of_median = if bin.count > 2 { MEDIAN_OVER_MEAN } else { 1.0 };
+            of_median * sigma / (bin.count.max(1) as f32).sqrt()
+        })
+    }
+
+    /// Whether a held-out bin lies within the 95 % interval of its prediction, the noise of its own
+    /// samples included; of the channels that can be told.
+    pub fn covers<'a>(&'a self, prediction: &'a Prediction) -> impl Iterator<Item = bool> + 'a {
+        let bin = prediction.bin;
+        let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
+        let error = self.standard_error(light, view, prediction.variance);
+        let noise = self.noise_variance / bin.count as f32;
+        (0..3).filter_map(move |c| {
+            let residual = prediction.residual(c)?;
+            Some(residual.powi(2) <= Z95 * Z95 * (error[c] * error[c] + noise))
+        })
+    }
+}
+
+impl Classes {
+    fn new(predictions: &[&Prediction], noise_variance: f32) -> Self {
+        let mut sorted: Vec<(f32, &Prediction)> =
+            predictions.iter().map(|p| (size(p.variance), *p)).collect();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let length = sorted.len().div_ceil(SIZES).max(1);
+        let mut limits = Vec::new();
+        let mut factors = Vec::new();
+        for class in sorted.chunks(length) {
+            limits.push(class.last().map_or(0.0, |last| last.0));
+            factors.push(factor_of(class, noise_variance));
+        }
+        limits.pop();
+        if factors.is_empty() {
+            factors.push(1.0);
+        }
+        Self { limits, factors }
+    }
+
+    fn factor(&self, size: f32) -> f32 {
+        let class = self.limits.partition_point(|limit| *limit < size);
+        self.factors[class.min(self.factors.len() - 1)]
+    }
+}
+
+/// The factor with which 95 % of the residuals lie within 1.96 standard errors: of each residual the
+/// factor that just reaches it, and of these the 95th percentile.
+fn factor_of(class: &[(f32, &Prediction)], noise_variance: f32) -> f32 {
+    let mut needed: Vec<f32> = class
+        .iter()
+        .flat_map(|(_, p)| {
+            (0..3).filter_map(|c| {
+                let beyond_noise =
+                    (p.residual(c)? / Z95).powi(2) - noise_variance / p.bin.count as f32;
+                Some((beyond_noise.max(0.0) / p.variance[c].max(1e-12)).sqrt())
+            })
+        })
+        .collect();
+    needed.sort_by(f32::total_cmp);
+    let rank = (0.95 * needed.len() as f32) as usize;
+    needed
+        .get(rank.min(needed.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(1.0)
+}
+
+fn size(variance: [f32; 3]) -> f32 {
+    variance.iter().map(|v| v.max(0.0)).sum::<f32>().sqrt()
+}
+
+fn is_grazing(light: Vec3, view: Vec3) -> bool {
+    light[2].min(view[2]) < GRAZING_DEG.to_radians().cos()
+}
+
+/// Which pairs of elevations are beyond all measured ones: for each elevation of one direction, the
+/// highest of the other.
+pub(super) struct Reach {
+    n_phi: usize,
+    /// By row of the grid: one more than the highest row measured with this row or a higher one.
+    rows: Vec<usize>,
+}
+
+impl Reach {
+    pub(super) fn new(bins: &Bins) -> Self {
+        let grid = bins.grid();
+        let n_phi = grid.n_phi();
+        let mut rows = vec![0; grid.n_theta()];
+        for bin in bins.bins() {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            let (i, v) = (light / n_phi, view / n_phi);
+            rows[i] = rows[i].max(v + 1);
+            rows[v] = rows[v].max(i + 1);
+        }
+        for row in (1..rows.len()).rev() {
+            rows[row - 1] = rows[row - 1].max(rows[row]);
+        }
+        Self { n_phi, rows }
+    }
+
+    pub(super) fn origin(&self, light: usize, view: usize) -> Origin {
+        if view / self.n_phi < self.rows[light / self.n_phi] {
+            Origin::Interpolated
+        } else {
+            Origin::Extrapolated
+        }
+    }
+}
+
+/// Writes the cells with samples, and their mirrors, over what the blocks gave.
+pub(super) fn write_measured(
+    bars: &mut ErrorBars,
+    bins: &Bins,
+    calibration: &Calibration,
+    values: &[Vec<f32>; 3],
+) {
+    let grid: Grid = bins.grid();
+    for (origin, mirrored) in [(Origin::Reciprocal, true), (Origin::Measured, false)] {
+        for bin in bins.bins() {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            let cell = if mirrored {
+                grid.cell(view, light)
+            } else {
+                bin.cell as usize
+            };
+            bars.origin[cell] = origin as u8;
+            let error = calibration.of_measured(bin);
+            for c in 0..3 {
+                bars.standard_error[c][cell] = error[c] * values[c][cell];
+            }
+        }
+    }
+}
