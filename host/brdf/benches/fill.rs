@@ -8,6 +8,7 @@
 mod plan;
 
 use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{Calibration, Preset, Settings, fill, fill_with_errors, select};
 use gonia_brdf::{Bins, Brdf, Grid};
 use plan::{cpu_seconds, material, measure};
@@ -75,6 +76,10 @@ fn main() {
         if arguments.iter().any(|a| a == "--errors") {
             errors(&bins, &selection.settings, &*model);
         }
+        let (across, inside) = bends(&dense, &selection.settings);
+        println!(
+            "  bends of the logarithm along the view's azimuth: {across:.5} across borders of blocks, {inside:.5} inside"
+        );
         let mut measured = vec![false; grid.n_cells()];
         for bin in bins.bins() {
             let (i, v) = grid.light_and_view(bin.cell as usize);
@@ -92,6 +97,31 @@ fn main() {
             selection.settings,
         );
     }
+}
+
+/// RMS of second differences of the logarithm between neighbouring cells of a row, that lie across a
+/// border of two blocks, and inside one: more across means that seams show.
+fn bends(dense: &gonia_brdf::DenseBrdf, settings: &Settings) -> (f64, f64) {
+    let grid = dense.grid();
+    let (n, n_phi) = (grid.n_directions(), grid.n_phi());
+    let mut block = vec![0; n];
+    for (number, patch) in cover(grid, &[settings.block_deg]).iter().enumerate() {
+        for direction in &patch.directions {
+            block[*direction as usize] = number;
+        }
+    }
+    let mut sums = [(0.0, 0usize); 2];
+    for light in (0..n).step_by(13) {
+        // Not at the pole, where all azimuths are one value.
+        for view in (n_phi..n).filter(|v| v % n_phi + 2 < n_phi) {
+            let logs = [0, 1, 2].map(|k| f64::from(dense.at(light, view + k)[1]).ln());
+            let across = usize::from(block[view] == block[view + 2]);
+            sums[across].0 += (logs[0] - 2.0 * logs[1] + logs[2]).powi(2);
+            sums[across].1 += 1;
+        }
+    }
+    let [across, inside] = sums.map(|(sum, count)| (sum / count.max(1) as f64).sqrt());
+    (across, inside)
 }
 
 /// Error bars: time, and how many of the truths lie within the 95 % interval of their cell.

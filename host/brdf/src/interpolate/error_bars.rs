@@ -2,7 +2,7 @@
 //! of the blocks, calibrated on bins held out.
 //!
 //! A block's own variance is a guess: it rests on one kernel and on few nodes. How far off it is,
-//! is measured on held-out bins, class by class (elevation, and size of the guess): each class gets
+//! is measured on held-out bins, class by class (elevation, brightness, and size of the guess): each class gets
 //! the factor with which 95 % of its bins lie within 1.96 standard errors.
 
 use super::Settings;
@@ -18,8 +18,10 @@ pub const Z95: f32 = 1.96;
 const TESTS: usize = 12_000;
 /// One frame in so many is held out.
 const ONE_IN: u32 = 24;
-/// Classes by size of the guess, for each of the two classes by elevation.
+/// Classes by size of the guess, at most, for each part of the domain …
 const SIZES: usize = 8;
+/// … and bins in one, at least: fewer cannot tell a 95th percentile.
+const CLASS_MIN: usize = 100;
 /// Elevations above this are a class of their own: views end there, degrees.
 const GRAZING_DEG: f64 = 75.0;
 /// Standard error of a median of normal values over that of their mean.
@@ -53,8 +55,10 @@ pub struct ErrorBars {
 /// What turns a block's variance into a standard error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    interior: Classes,
-    grazing: Classes,
+    /// By [`Calibration::part`]: interior and grazing, each of usual brightness and bright.
+    parts: [Classes; 4],
+    /// Mean logarithm over the channels above which a value is bright.
+    bright: f32,
     noise_variance: f32,
 }
 
@@ -70,38 +74,63 @@ impl Calibration {
     /// Calibrates on bins held out. `None` when too few frames (or clusters of directions) are there
     /// to hold any out.
     pub fn new(bins: &Bins, settings: &Settings) -> Option<Self> {
-        let held_out = HoldOut::new(bins, settings.coordinates, 7, ONE_IN, TESTS)?;
-        Some(Self::from_predictions(
-            &held_out.predict(settings),
-            settings.noise_variance,
-        ))
+        let sets = HoldOut::sets(bins);
+        let mut predictions = Vec::new();
+        for set in 0..sets {
+            let set = ONE_IN - 1 - set;
+            if let Some(held_out) = HoldOut::new(
+                bins,
+                settings.coordinates,
+                set,
+                ONE_IN,
+                TESTS / sets as usize,
+            ) {
+                predictions.extend(held_out.predict(settings));
+            }
+        }
+        let noise_variance = settings.noise_variance;
+        (!predictions.is_empty()).then(|| Self::from_predictions(&predictions, noise_variance))
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.
     pub fn from_predictions(predictions: &[Prediction], noise_variance: f32) -> Self {
-        let (grazing, interior): (Vec<&Prediction>, Vec<&Prediction>) = predictions
-            .iter()
-            .partition(|p| is_grazing(p.bin.light.map(f64::from), p.bin.view.map(f64::from)));
-        let all: Vec<&Prediction> = predictions.iter().collect();
-        let classes = |part: Vec<&Prediction>| {
-            let part = if part.len() < 40 * SIZES { &all } else { &part };
-            Classes::new(part, noise_variance)
-        };
-        Self {
-            interior: classes(interior),
-            grazing: classes(grazing),
+        let mut logs: Vec<f32> = predictions.iter().map(|p| mean(p.log)).collect();
+        logs.sort_by(f32::total_cmp);
+        // The brightest tenth of all is about half of the bins that a hold-out picks.
+        let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
+        let mut calibration = Self {
+            parts: [(); 4].map(|()| Classes::new(&[], noise_variance)),
+            bright,
             noise_variance,
+        };
+        let all: Vec<&Prediction> = predictions.iter().collect();
+        for part in 0..4 {
+            let of_part = |p: &&Prediction| {
+                let (light, view) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
+                calibration.part(light, view, p.log) == part
+            };
+            let own: Vec<&Prediction> = all.iter().copied().filter(of_part).collect();
+            let enough = own.len() >= CLASS_MIN;
+            calibration.parts[part] =
+                Classes::new(if enough { &own } else { &all }, noise_variance);
         }
+        calibration
     }
 
-    /// Standard error of the logarithm, per channel, from a block's variance.
-    pub fn standard_error(&self, light: Vec3, view: Vec3, variance: [f32; 3]) -> [f32; 3] {
-        let classes = if is_grazing(light, view) {
-            &self.grazing
-        } else {
-            &self.interior
-        };
-        let factor = classes.factor(size(variance));
+    fn part(&self, light: Vec3, view: Vec3, log: [f32; 3]) -> usize {
+        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cos();
+        2 * usize::from(grazing) + usize::from(mean(log) > self.bright)
+    }
+
+    /// Standard error of the logarithm, per channel, from a block's logarithm and its variance.
+    pub fn standard_error(
+        &self,
+        light: Vec3,
+        view: Vec3,
+        log: [f32; 3],
+        variance: [f32; 3],
+    ) -> [f32; 3] {
+        let factor = self.parts[self.part(light, view, log)].factor(size(variance));
         variance.map(|v| factor * v.max(0.0).sqrt())
     }
 
@@ -125,7 +154,7 @@ impl Calibration {
     pub fn covers<'a>(&'a self, prediction: &'a Prediction) -> impl Iterator<Item = bool> + 'a {
         let bin = prediction.bin;
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
-        let error = self.standard_error(light, view, prediction.variance);
+        let error = self.standard_error(light, view, prediction.log, prediction.variance);
         let noise = self.noise_variance / bin.count as f32;
         (0..3).filter_map(move |c| {
             let residual = prediction.residual(c)?;
@@ -139,7 +168,7 @@ impl Classes {
         let mut sorted: Vec<(f32, &Prediction)> =
             predictions.iter().map(|p| (size(p.variance), *p)).collect();
         sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let length = sorted.len().div_ceil(SIZES).max(1);
+        let length = sorted.len().div_ceil(SIZES).max(CLASS_MIN);
         let mut limits = Vec::new();
         let mut factors = Vec::new();
         for class in sorted.chunks(length) {
@@ -184,8 +213,8 @@ fn size(variance: [f32; 3]) -> f32 {
     variance.iter().map(|v| v.max(0.0)).sum::<f32>().sqrt()
 }
 
-fn is_grazing(light: Vec3, view: Vec3) -> bool {
-    light[2].min(view[2]) < GRAZING_DEG.to_radians().cos()
+fn mean(log: [f32; 3]) -> f32 {
+    log.iter().sum::<f32>() / 3.0
 }
 
 /// Which pairs of elevations are beyond all measured ones: for each elevation of one direction, the

@@ -96,7 +96,7 @@ fn solve(
                     errors.store(grid, p, q, |k| {
                         let (light, view) = (k / q.vectors.len(), k % q.vectors.len());
                         let (light, view) = (p.vectors[light], q.vectors[view]);
-                        let error = calibration.standard_error(light, view, variances[k]);
+                        let error = calibration.standard_error(light, view, logs[k], variances[k]);
                         [0, 1, 2].map(|c| error[c] * bounded_exp(logs[k][c]))
                     });
                 }

@@ -21,6 +21,11 @@ const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
+/// With fewer bins than this, one set of frames would decide by chance; several are cheap then.
+const MANY_BINS: usize = 1_000_000;
+/// Sets of frames to hold out in turn, where there are few bins.
+const SETS: u32 = 4;
+
 /// Some bins held out of all.
 pub struct HoldOut<'a> {
     grid: Grid,
@@ -88,6 +93,15 @@ impl<'a> HoldOut<'a> {
             levels,
             coordinates,
         })
+    }
+
+    /// How many sets to hold out in turn.
+    pub fn sets(bins: &Bins) -> u32 {
+        if bins.bins().len() < MANY_BINS {
+            SETS
+        } else {
+            1
+        }
     }
 
     /// Predicts the tests, by the very blocks that a fill with these settings would use.

@@ -10,11 +10,6 @@ use crate::bins::Bins;
 const TESTS: usize = 1200;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
-/// With fewer bins than this the choice is a near tie that one set of frames would decide by chance;
-/// several are cheap then.
-const MANY_BINS: usize = 1_000_000;
-/// Sets of frames held out in turn, where there are few bins.
-const SETS: u32 = 4;
 /// The systems of coordinates that compete.
 const CANDIDATES: [Coordinates; 4] = [
     Coordinates::HalfDifference { weight: 0.5 },
@@ -49,11 +44,7 @@ pub fn select(bins: &Bins, base: Settings) -> Selection {
     if let Some(variance) = log_noise_variance(bins.bins().iter()) {
         settings.noise_variance = variance;
     }
-    let sets = if bins.bins().len() < MANY_BINS {
-        SETS
-    } else {
-        1
-    };
+    let sets = HoldOut::sets(bins);
     let tests = TESTS / sets as usize;
     let candidates = CANDIDATES.map(|coordinates| Settings {
         coordinates,

@@ -1,0 +1,197 @@
+//! What the interpolation owes to any material, on a plan of some hundred frames.
+
+use gonia_brdf::direction::{Vec3, local_direction};
+use gonia_brdf::hemisphere::{paper_lights, paper_views};
+use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::levels::Levels;
+use gonia_brdf::interpolate::nodes::nodes_of;
+use gonia_brdf::interpolate::patches::{Patch, cover};
+use gonia_brdf::interpolate::refine::Refiner;
+use gonia_brdf::interpolate::{
+    Calibration, Coordinates, Origin, Settings, fill, fill_with_errors, select,
+};
+use gonia_brdf::model::{Brdf, Kurt, KurtLobe};
+use gonia_brdf::{Bins, Direction, Grid, Sample};
+
+/// Standard deviation of the samples' noise, relative.
+const NOISE: f64 = 0.02;
+
+/// Every ninth frame of the paper's plan, points 56 mm apart.
+fn measure(model: &dyn Brdf) -> Vec<Sample> {
+    let (lights, views) = (paper_lights(), paper_views());
+    let mut state = 1u64;
+    let mut uniform = move || {
+        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+        (state >> 40) as f64 / (1u64 << 24) as f64
+    };
+    let mut samples = Vec::new();
+    for frame in (0..lights.len() * views.len()).step_by(9) {
+        let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
+        for (x, y) in (-4..=4).flat_map(|x| (-4..=4).map(move |y| (x, y))) {
+            let point = [0.056 * f64::from(x), 0.056 * f64::from(y)];
+            let l = local_direction(light, 1.1, point);
+            let v = local_direction(view, 1.8, point);
+            let value = model.eval(l, v);
+            // Nearly normal: the sum of four uniform numbers.
+            let rgb = value.map(|value| {
+                let sum: f64 = (0..4).map(|_| uniform()).sum();
+                (value * (1.0 + NOISE * (sum - 2.0) * 3f64.sqrt())) as f32
+            });
+            let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
+            samples.push(Sample {
+                theta_i_deg: l.theta_deg() as f32,
+                phi_i_deg: l.phi_deg() as f32,
+                theta_v_deg: v.theta_deg() as f32,
+                phi_v_deg: v.phi_deg() as f32,
+                rgb,
+                frame: frame as u32,
+            });
+        }
+    }
+    samples
+}
+
+fn broad() -> Kurt {
+    Kurt::new(
+        [0.2, 0.15, 0.1],
+        &[KurtLobe {
+            specular: [2.0, 1.6, 1.2],
+            f0: 0.05,
+            mx: 0.15,
+            my: 0.4,
+            alpha: 0.3,
+            azimuth_deg: 31.0,
+        }],
+    )
+}
+
+fn angles(bin_light: [f32; 3], bin_view: [f32; 3]) -> (f64, f64) {
+    let deg = |d: [f32; 3]| f64::from(d[2]).min(1.0).acos().to_degrees();
+    (deg(bin_light), deg(bin_view))
+}
+
+#[test]
+fn held_out_bins_lie_within_their_error_bars() {
+    let grid = Grid::with_step_deg(4.0).unwrap();
+    for model in [broad(), Kurt::two_thread_fabric()] {
+        let bins = Bins::new(grid, &measure(&model));
+        let settings = Settings {
+            noise_variance: (NOISE * NOISE) as f32,
+            ..Settings::DEFAULT
+        };
+        let calibration = Calibration::new(&bins, &settings).unwrap();
+        // Other frames than those that the calibration held out.
+        let mut shares = [[0.0f32; 2]; 4];
+        for set in 0..4 {
+            let held_out = HoldOut::new(&bins, settings.coordinates, set, 24, 4000).unwrap();
+            let predictions = held_out.predict(&settings);
+            let mut bright: Vec<f32> = predictions.iter().map(|p| p.bin.median[1]).collect();
+            bright.sort_by(f32::total_cmp);
+            let bright = bright[bright.len() * 9 / 10];
+            for p in &predictions {
+                let (i, v) = angles(p.bin.light, p.bin.view);
+                let strata = [
+                    true,
+                    i.max(v) <= 75.0,
+                    i.max(v) > 75.0,
+                    p.bin.median[1] > bright,
+                ];
+                for covered in calibration.covers(p) {
+                    for (share, _) in shares.iter_mut().zip(strata).filter(|(_, inside)| *inside) {
+                        share[0] += p.weight * f32::from(u8::from(covered));
+                        share[1] += p.weight;
+                    }
+                }
+            }
+        }
+        for (name, [inside, all]) in ["all", "interior", "grazing", "bright"].iter().zip(shares) {
+            let percent = 100.0 * inside / all;
+            println!("{name}: {percent:.1} % of {all}");
+            assert!((93.0..=97.0).contains(&percent), "{name}: {percent} %");
+        }
+    }
+}
+
+#[test]
+fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let bins = Bins::new(grid, &measure(&broad()));
+    let settings = Settings {
+        nodes: 48,
+        ..Settings::DEFAULT
+    };
+    let calibration = Calibration::new(&bins, &settings).unwrap();
+    let (dense, bars) = fill_with_errors(&bins, &settings, &calibration, &|_| ()).unwrap();
+    assert_eq!(dense, fill(&bins, &settings, &|_| ()).unwrap());
+    for plane in &bars.standard_error {
+        assert!(plane.iter().all(|e| e.is_finite() && *e >= 0.0));
+    }
+    let origin = |i: f64, v: f64| {
+        let at = |theta| grid.nearest(theta, 30.0).unwrap();
+        bars.origin[grid.cell(at(i), at(v))]
+    };
+    assert_eq!(origin(84.0, 84.0), Origin::Extrapolated as u8);
+    assert_ne!(origin(84.0, 60.0), Origin::Extrapolated as u8);
+    let count = |o: Origin| bars.origin.iter().filter(|k| **k == o as u8).count();
+    assert_eq!(count(Origin::Measured), bins.bins().len());
+    assert!(count(Origin::Reciprocal) > 0 && count(Origin::Interpolated) > 0);
+}
+
+#[test]
+fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
+    let grid = Grid::PAPER;
+    let sharp = Kurt::new(
+        [0.2; 3],
+        &[KurtLobe {
+            specular: [1.0; 3],
+            f0: 0.05,
+            mx: 0.04,
+            my: 0.04,
+            alpha: 0.3,
+            azimuth_deg: 0.0,
+        }],
+    );
+    let at = |theta: f64, phi: f64| -> Vec3 { Direction::from_deg(theta, phi).to_vec3() };
+    let cut = |model: &dyn Brdf, view: Vec3| {
+        let bins = Bins::new(grid, &measure(model));
+        let settings = Settings {
+            noise_variance: (NOISE * NOISE) as f32,
+            ..Settings::DEFAULT
+        };
+        let levels = Levels::new(nodes_of(bins.bins().iter(), settings.coordinates));
+        let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]);
+        let around = |d: Vec3| {
+            let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
+            patches
+                .iter()
+                .max_by(|a, b| near(a).total_cmp(&near(b)))
+                .unwrap()
+        };
+        let mut refiner = Refiner::default();
+        refiner.solve(&levels, &settings, around(at(30.0, 0.0)), around(view));
+        refiner.count.cut == 1
+    };
+    assert!(cut(&sharp, at(32.0, 180.0)));
+    assert!(!cut(&sharp, at(45.0, 90.0)));
+    assert!(!cut(&Kurt::white_reference_fabric(), at(32.0, 180.0)));
+}
+
+#[test]
+fn samples_without_frames_are_held_out_by_clusters() {
+    let mut samples = measure(&broad());
+    samples.iter_mut().for_each(|s| s.frame = Sample::NO_FRAME);
+    let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &samples);
+    let coordinates = Coordinates::SumDifference { weight: 1.0 };
+    let held_out = HoldOut::new(&bins, coordinates, 0, 24, 500).unwrap();
+    let predictions = held_out.predict(&Settings {
+        coordinates,
+        ..Settings::DEFAULT
+    });
+    assert!(predictions.len() >= 100);
+    let near = predictions
+        .iter()
+        .filter(|p| p.residual(1).unwrap().abs() < 0.1)
+        .count();
+    assert!(10 * near > 8 * predictions.len(), "{near}");
+    assert_eq!(select(&bins, Settings::DEFAULT).trials.len(), 4);
+}
