@@ -1,6 +1,7 @@
 //! Hough transform of one strip: where the bright line is, to about a pixel.
 
 use super::lines::LineStrip;
+use crate::dataset::Frame;
 
 /// A line in a strip: t = offset + slope·s, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,7 +22,12 @@ impl StripLine {
 /// Finds the strongest bright line within `search_px` of the prediction. Every Sobel edge votes,
 /// with its sign, for the lines through it; a bright line is where a rise is followed, one line's
 /// width further out, by a fall. Each station has the same say, however brightly it is lit.
-pub fn strongest_line(strip: &LineStrip, half_width_mm: f64, search_px: f64) -> Option<StripLine> {
+pub fn strongest_line(
+    frame: &Frame,
+    strip: &LineStrip,
+    half_width_mm: f64,
+    search_px: f64,
+) -> Option<StripLine> {
     if strip.stations.is_empty() {
         return None;
     }
@@ -34,14 +40,17 @@ pub fn strongest_line(strip: &LineStrip, half_width_mm: f64, search_px: f64) -> 
     let slopes = 2 * (max_slope / bin).ceil() as usize + 1;
     let slope_at = |i: usize| (i as f64 - (slopes / 2) as f64) * bin;
     let mut votes = vec![0.0f32; slopes * bins];
+    let mut gradients = Vec::new();
     for station in &strip.stations {
         let run = &strip.samples[station.run.clone()];
-        let strongest = run.iter().map(|p| p.gradient.abs()).fold(0.0, f32::max);
+        gradients.clear();
+        gradients.extend(run.iter().map(|sample| strip.gradient(frame, sample)));
+        let strongest = gradients.iter().map(|g| g.abs()).fold(0.0, f32::max);
         if strongest <= 0.0 {
             continue;
         }
-        for sample in run {
-            let weight = sample.gradient / strongest;
+        for (sample, gradient) in run.iter().zip(&gradients) {
+            let weight = gradient / strongest;
             if weight.abs() < 0.1 {
                 continue;
             }

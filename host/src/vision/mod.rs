@@ -8,6 +8,7 @@ pub mod ideal_light;
 mod lines;
 pub mod occlusion;
 mod profile;
+mod quantiles;
 mod refine;
 pub mod register;
 #[cfg(test)]

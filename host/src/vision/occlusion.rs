@@ -32,6 +32,20 @@ impl Mask {
         self.words[bit / 64] >> (bit % 64) & 1 == 1
     }
 
+    /// Whether one of a row's pixels is hidden.
+    pub fn hides_any(&self, columns: &std::ops::Range<usize>, row: usize) -> bool {
+        let y = (row / self.cell).wrapping_sub(self.top);
+        if y >= self.height || columns.is_empty() {
+            return false;
+        }
+        let first = (columns.start / self.cell).max(self.left);
+        let last = ((columns.end - 1) / self.cell).min(self.left + self.width - 1);
+        (first..=last).any(|x| {
+            let bit = y * self.width + x - self.left;
+            self.words[bit / 64] >> (bit % 64) & 1 == 1
+        })
+    }
+
     /// Number of hidden cells.
     pub fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()

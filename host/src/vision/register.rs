@@ -42,6 +42,8 @@ const LOOSE_ARM_DEG: f64 = 0.5;
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
 const SEARCH_WIDTHS: f64 = 0.02;
+/// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
+const NEAR_WIDTHS: f64 = 1e-3;
 /// A line further than this from its prediction is measured again from a better one.
 const RELINEARIZE_PX: f64 = 1.5;
 
@@ -184,17 +186,8 @@ impl Registrar {
         view: Direction,
         predicted: &Homography,
     ) -> Result<Solution, Failure> {
-        let search_px = SEARCH_WIDTHS * frame.width as f64 + 4.0;
-        let strips = SIDES.map(|side| {
-            LineStrip::cut(
-                frame,
-                &self.camera,
-                predicted,
-                &self.target,
-                side,
-                search_px,
-            )
-        });
+        let width = frame.width as f64;
+        let strips = self.strips(frame, predicted, NEAR_WIDTHS * width + 4.0);
         let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
         if fit.lines.iter().all(Option::is_some) {
             let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
@@ -203,11 +196,27 @@ impl Registrar {
                 return self.settle(view, &strips, fit, estimate);
             }
         }
+        let search_px = SEARCH_WIDTHS * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
         let half_width = 0.5 * self.target.line_width_mm;
-        let hough = [0, 1, 2, 3].map(|i| strongest_line(&strips[i], half_width, search_px));
+        let hough = [0, 1, 2, 3].map(|i| strongest_line(frame, &strips[i], half_width, search_px));
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the marks beside them.
             self.search(view, &strips, [None; 4]).map_err(|_| failure)
+        })
+    }
+
+    /// The neighbourhoods of the four lines, `search_px` to either side.
+    fn strips(&self, frame: &Frame, predicted: &Homography, search_px: f64) -> [LineStrip; 4] {
+        SIDES.map(|side| {
+            LineStrip::cut(
+                frame,
+                &self.camera,
+                predicted,
+                &self.target,
+                side,
+                search_px,
+            )
         })
     }
 

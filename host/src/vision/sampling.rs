@@ -1,6 +1,7 @@
 //! The values at the grid points of a frame: medians over the pixels of projected patches.
 
 use super::occlusion::Mask;
+use super::quantiles::{Workspace, median_and_spread};
 use super::register::Registration;
 use crate::dataset::{Frame, Rig};
 
@@ -90,6 +91,7 @@ impl SamplingGrid {
             patch_half: 0.5 * self.patch_mm,
             limit: self.material_half_mm,
             channels: [Vec::new(), Vec::new(), Vec::new()],
+            room: Workspace::default(),
         };
         self.points_mm.iter().map(|p| sampler.point(*p)).collect()
     }
@@ -102,6 +104,7 @@ struct Sampler<'a> {
     patch_half: f64,
     limit: f64,
     channels: [Vec<f32>; 3],
+    room: Workspace,
 }
 
 impl Sampler<'_> {
@@ -123,11 +126,20 @@ impl Sampler<'_> {
         }
         let mut sum = [0.0; 2];
         for (row, columns) in Rows::of(&corners) {
-            for column in columns {
-                self.take(column, row)?;
-                sum[0] += column as f64 + 0.5;
-                sum[1] += row as f64 + 0.5;
+            if self.mask.is_some_and(|mask| mask.hides_any(&columns, row)) {
+                return Err(LeftOut::Occlusion);
             }
+            let n = columns.len() as f64;
+            sum[0] += n * 0.5 * (columns.start + columns.end) as f64;
+            sum[1] += n * (row as f64 + 0.5);
+            let start = row * self.frame.width;
+            let pixels = &self.frame.rgb[start + columns.start..start + columns.end];
+            for (c, channel) in self.channels.iter_mut().enumerate() {
+                channel.extend(pixels.iter().map(|rgb| rgb[c]));
+            }
+        }
+        if let Some(reason) = self.unusable() {
+            return Err(reason);
         }
         let pixels = self.channels[0].len();
         if pixels < FEWEST_PIXELS {
@@ -138,19 +150,16 @@ impl Sampler<'_> {
         Ok(self.value(seen, pixels as u32))
     }
 
-    /// Adds a pixel to the patch.
-    fn take(&mut self, column: usize, row: usize) -> Result<(), LeftOut> {
-        if self.mask.is_some_and(|mask| mask.hides(column, row)) {
-            return Err(LeftOut::Occlusion);
+    /// Why the values gathered are no radiance, if they are not.
+    fn unusable(&self) -> Option<LeftOut> {
+        // All bits of the exponent are set in infinities and in what is no number: one more of it
+        // carries into the sign.
+        let carry = |v: &f32| (v.to_bits() & 0x7fff_ffff) + 0x0080_0000;
+        let bits = |channel: &Vec<f32>| channel.iter().fold(0, |bits, v| bits | carry(v));
+        if self.channels.iter().all(|channel| bits(channel) >> 31 == 0) {
+            return None;
         }
-        let rgb = self.frame.rgb[row * self.frame.width + column];
-        if !rgb.iter().all(|v| v.is_finite()) {
-            return Err(LeftOut::NotFinite);
-        }
-        for (channel, value) in self.channels.iter_mut().zip(rgb) {
-            channel.push(value);
-        }
-        Ok(())
+        Some(LeftOut::NotFinite)
     }
 
     /// Median over points spread evenly over a patch of hardly any pixels, each bilinear between
@@ -216,7 +225,7 @@ impl Sampler<'_> {
     fn value(&mut self, offset_mm: [f32; 2], pixels: u32) -> PointValue {
         let (mut rgb, mut spread) = ([0.0; 3], [0.0; 3]);
         for c in 0..3 {
-            (rgb[c], spread[c]) = median_and_spread(&mut self.channels[c]);
+            (rgb[c], spread[c]) = median_and_spread(&mut self.channels[c], &mut self.room);
         }
         PointValue {
             rgb,
@@ -225,32 +234,6 @@ impl Sampler<'_> {
             spread,
         }
     }
-}
-
-/// Median, and the quartiles' distance scaled to the standard deviation of a normal distribution.
-/// The slice, which must not be empty, is reordered.
-fn median_and_spread(values: &mut [f32]) -> (f32, f32) {
-    let n = values.len();
-    let middle = n / 2;
-    let (below, upper, above) = values.select_nth_unstable_by(middle, f32::total_cmp);
-    let median = if n % 2 == 1 {
-        *upper
-    } else {
-        let lower = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        0.5 * (lower + *upper)
-    };
-    if below.is_empty() || above.is_empty() {
-        return (median, 0.0);
-    }
-    let quarter = n / 4;
-    let upper_at = (n - 1 - quarter).saturating_sub(middle + 1);
-    let high = *above
-        .select_nth_unstable_by(upper_at.min(above.len() - 1), f32::total_cmp)
-        .1;
-    let low = *below
-        .select_nth_unstable_by(quarter.min(below.len() - 1), f32::total_cmp)
-        .1;
-    (median, (high - low) / 1.349)
 }
 
 /// The pixels whose centres lie in a convex quadrilateral, row by row.
@@ -310,20 +293,6 @@ mod tests {
         let grid = SamplingGrid::new(&Rig::paper(400));
         assert_eq!(grid.points_mm().len(), 1225);
         assert_eq!(grid.points_mm()[grid.centre()], [0.0, 0.0]);
-    }
-
-    #[test]
-    fn medians_and_spreads_are_those_of_the_sorted_values() {
-        let mut odd = vec![5.0, 1.0, 3.0, 100.0, 2.0];
-        assert_eq!(median_and_spread(&mut odd).0, 3.0);
-        let mut even = vec![4.0, 1.0, 2.0, 3.0];
-        assert_eq!(median_and_spread(&mut even).0, 2.5);
-        assert_eq!(median_and_spread(&mut [7.0]), (7.0, 0.0));
-        // Of 1 ..= 101 the quartiles are 26 and 76.
-        let mut many: Vec<f32> = (1..=101).rev().map(|i| i as f32).collect();
-        let (median, spread) = median_and_spread(&mut many);
-        assert_eq!(median, 51.0);
-        assert!((spread * 1.349 - 50.0).abs() < 1e-3);
     }
 
     #[test]
