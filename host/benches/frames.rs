@@ -121,7 +121,9 @@ fn median_ms(mut work: impl FnMut()) -> f64 {
     let clock = Instant::now();
     let once = Instant::now();
     work();
-    let repeats = (RUN_MS / (once.elapsed().as_secs_f64() * 1e3)).ceil().max(1.0) as u32;
+    let repeats = (RUN_MS / (once.elapsed().as_secs_f64() * 1e3))
+        .ceil()
+        .max(1.0) as u32;
     let mut times: Vec<f64> = (0..RUNS)
         .map(|_| {
             let before = thread_ms(&clock);

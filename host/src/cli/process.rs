@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Registers each frame from its marks, samples it, and compensates by the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig."
+    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig. Raw exposures\n(PNG of 8 or 16 bits: mono, Bayer or RGB) have an exposure_s as well; rows of one frame and role are\nmerged by the [sensor] of rig.toml."
 )]
 pub struct Process {
     /// The capture folder
@@ -147,12 +147,13 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
         (
             "samples".into(),
             format!(
-                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} not finite)",
+                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} saturated, {} not finite)",
                 table::count(processed.samples.len() as u64),
                 table::count(left_out.total()),
                 table::count(left_out.occlusion),
                 table::count(left_out.dark_reference + left_out.below_horizon),
                 table::count(left_out.mark + left_out.border),
+                table::count(left_out.saturated),
                 table::count(left_out.not_finite)
             ),
         ),

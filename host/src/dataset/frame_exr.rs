@@ -3,6 +3,7 @@
 use super::exr_planes::{self, ExrPlanes, Plane};
 use super::{FileError, Frame};
 use exr::prelude::f16;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -13,7 +14,7 @@ const LEAST: f32 = -1e6;
 ///
 /// # Errors
 /// One line naming the file, and the channel and pixel where there is one: not an EXR, cut short,
-/// not RGB, or with values that are no radiance (NaN, infinite, below −10⁶).
+/// not RGB, or with values that are no radiance (NaN, below −10⁶). +∞ is one: a saturated pixel.
 pub fn read_frame(path: &Path) -> Result<Frame, FileError> {
     read_checked(path, |width, height| {
         if width > 65_536 || height > 65_536 {
@@ -69,7 +70,7 @@ fn read_checked(
     }
     match rgb
         .iter()
-        .position(|pixel| !pixel.iter().all(|v| v.is_finite() && *v >= LEAST))
+        .position(|pixel| !pixel.iter().all(|v| *v >= LEAST))
     {
         None => Ok(Frame { width, height, rgb }),
         Some(place) => Err(bad_pixel(path, rgb[place], place % width, place / width)),
@@ -78,7 +79,13 @@ fn read_checked(
 
 fn bad_pixel(path: &Path, pixel: [f32; 3], x: usize, y: usize) -> FileError {
     let bad = (0..3)
-        .find(|c| !(pixel[*c].is_finite() && pixel[*c] >= LEAST))
+        // A NaN is not at least anything either.
+        .find(|c| {
+            !matches!(
+                pixel[*c].partial_cmp(&LEAST),
+                Some(Ordering::Greater | Ordering::Equal)
+            )
+        })
         .unwrap_or(0);
     FileError::new(
         path,

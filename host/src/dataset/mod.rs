@@ -15,6 +15,7 @@ pub mod frame_exr;
 pub mod frames_csv;
 mod npy;
 pub mod plan_csv;
+pub mod raw_frame;
 pub mod rig;
 pub mod rig_toml;
 pub mod samples;

@@ -1,6 +1,6 @@
 //! `rig.toml`: reading, checking and writing a [`Rig`].
 
-use super::rig::Rig;
+use super::rig::{Rig, Sensor};
 use super::whole_file::write_whole_bytes;
 use super::{FileError, toml_text};
 use std::ops::RangeInclusive;
@@ -54,6 +54,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         camera,
         target,
         reference,
+        sensor,
         sampling,
     } = rig;
     within("light.distance_m", light.distance_m, 0.01..=1000.0, "m")?;
@@ -116,6 +117,10 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         }
     }
 
+    if let Some(sensor) = sensor {
+        check_sensor(sensor)?;
+    }
+
     within(
         "sampling.disc_radius_mm",
         sampling.disc_radius_mm,
@@ -160,6 +165,45 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     Ok(())
 }
 
+fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
+    let counts = f64::from(u16::MAX);
+    within(
+        "sensor.black_counts",
+        sensor.black_counts,
+        0.0..=counts,
+        "counts",
+    )?;
+    within(
+        "sensor.saturation_counts",
+        sensor.saturation_counts,
+        f64::MIN_POSITIVE..=counts,
+        "counts",
+    )?;
+    within(
+        "sensor.gain_e_per_count",
+        sensor.gain_e_per_count,
+        1e-6..=1e6,
+        "electrons a count",
+    )?;
+    within(
+        "sensor.read_noise_e",
+        sensor.read_noise_e,
+        0.0..=1e6,
+        "electrons",
+    )?;
+    if sensor.black_counts < sensor.saturation_counts {
+        return Ok(());
+    }
+    Err(RigError {
+        key: "sensor.saturation_counts",
+        problem: format!(
+            "saturation ({} counts) does not lie above black ({} counts)",
+            sensor.saturation_counts, sensor.black_counts
+        ),
+        remedy: "give the counts of a frame without light, and those the sensor ends at".into(),
+    })
+}
+
 fn within(
     key: &'static str,
     value: f64,
@@ -190,7 +234,7 @@ fn within(
 
 #[cfg(test)]
 mod tests {
-    use super::super::rig::Reference;
+    use super::super::rig::{Bayer, Reference};
     use super::*;
 
     fn read_text(text: &str) -> Result<Rig, FileError> {
@@ -212,6 +256,13 @@ mod tests {
         rig.camera.k1 = -0.02;
         rig.reference = Some(Reference {
             reflectance: [0.99, 0.98, 1.0],
+        });
+        rig.sensor = Some(Sensor {
+            black_counts: 64.0,
+            saturation_counts: 4000.0,
+            gain_e_per_count: 2.5,
+            read_noise_e: 4.0,
+            bayer: Some(Bayer::Grbg),
         });
         write_rig(&path, &rig).unwrap();
         assert_eq!(read_rig(&path).unwrap(), rig);
@@ -267,6 +318,11 @@ mod tests {
                 "distance_m = 1.1",
                 "distance_m = 0.2",
                 "sampling.disc_radius_mm",
+            ),
+            (
+                "[sampling]",
+                "[sensor]\nblack_counts = 4095\nsaturation_counts = 64\ngain_e_per_count = 2\nread_noise_e = 3\n[sampling]",
+                "sensor.saturation_counts",
             ),
         ] {
             let text = paper_text();

@@ -82,10 +82,18 @@ fn range(values: &[f32]) -> (f32, f32) {
     for chunk in chunks {
         for i in 0..LANES {
             low[i] = if chunk[i] < low[i] { chunk[i] } else { low[i] };
-            high[i] = if chunk[i] > high[i] { chunk[i] } else { high[i] };
+            high[i] = if chunk[i] > high[i] {
+                chunk[i]
+            } else {
+                high[i]
+            };
         }
     }
-    let least = low.iter().chain(rest).copied().fold(f32::INFINITY, f32::min);
+    let least = low
+        .iter()
+        .chain(rest)
+        .copied()
+        .fold(f32::INFINITY, f32::min);
     let most = high
         .iter()
         .chain(rest)

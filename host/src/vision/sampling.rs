@@ -36,6 +36,8 @@ pub enum LeftOut {
     Mark,
     /// Its patch holds a pixel that is not a number.
     NotFinite,
+    /// Its patch holds a pixel that was too bright for the sensor (+∞).
+    Saturated,
     /// Its patch reaches beyond the frame.
     Border,
 }
@@ -159,7 +161,7 @@ impl Sampler<'_> {
         if self.channels.iter().all(|channel| bits(channel) >> 31 == 0) {
             return None;
         }
-        Some(LeftOut::NotFinite)
+        Some(reason_of(self.channels.iter().flatten().copied()))
     }
 
     /// Median over points spread evenly over a patch of hardly any pixels, each bilinear between
@@ -181,7 +183,7 @@ impl Sampler<'_> {
             }
             let (column, row) = (p[0] as usize, p[1] as usize);
             let f = [p[0].fract() as f32, p[1].fract() as f32];
-            let mut value = [0.0f32; 3];
+            let (mut value, mut worst) = ([0.0f32; 3], [0.0f32; 3]);
             for (dc, wc) in [(0, 1.0 - f[0]), (1, f[0])] {
                 for (dr, wr) in [(0, 1.0 - f[1]), (1, f[1])] {
                     let (column, row) = (column + dc, row + dr);
@@ -189,13 +191,14 @@ impl Sampler<'_> {
                         return Err(LeftOut::Occlusion);
                     }
                     let rgb = self.frame.rgb[row * self.frame.width + column];
-                    for (sum, v) in value.iter_mut().zip(rgb) {
-                        *sum += wc * wr * v;
+                    for c in 0..3 {
+                        value[c] += wc * wr * rgb[c];
+                        worst[c] = if rgb[c].is_finite() { worst[c] } else { rgb[c] };
                     }
                 }
             }
-            if !value.iter().all(|v| v.is_finite()) {
-                return Err(LeftOut::NotFinite);
+            if !worst.iter().all(|v| v.is_finite()) {
+                return Err(reason_of(worst.into_iter()));
             }
             for (channel, v) in self.channels.iter_mut().zip(value) {
                 channel.push(v);
@@ -233,6 +236,15 @@ impl Sampler<'_> {
             pixels,
             spread,
         }
+    }
+}
+
+/// Why values, not all of them finite, are no radiance.
+fn reason_of(mut values: impl Iterator<Item = f32>) -> LeftOut {
+    if values.any(|v| v.is_nan() || v == f32::NEG_INFINITY) {
+        LeftOut::NotFinite
+    } else {
+        LeftOut::Saturated
     }
 }
 
