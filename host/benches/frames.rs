@@ -11,7 +11,9 @@ use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
 use gonia_sim::scene::{Scene, SceneGeometry, Surface};
 use std::sync::Arc;
-use std::time::Instant;
+
+mod clock;
+use clock::{mean, median_ms};
 
 /// Poses over the plan's elevations, one of them with the light's head in the way.
 const POSES: [[f64; 4]; 7] = [
@@ -24,10 +26,6 @@ const POSES: [[f64; 4]; 7] = [
     [75.0, 165.0, 75.0, 345.0],
 ];
 
-/// Runs of which the median counts.
-const RUNS: usize = 5;
-/// Least length of a run, milliseconds.
-const RUN_MS: f64 = 150.0;
 /// What the paper needs for an image, mostly to load it, milliseconds.
 const PAPER_MS: f64 = 2500.0;
 
@@ -113,39 +111,6 @@ fn decode_ms(px: usize) -> f64 {
     });
     std::fs::remove_file(&file).expect("the frame is removed");
     ms
-}
-
-/// Median of this thread's CPU milliseconds over a few runs, each long enough for the system's
-/// clock, which may tick only every few milliseconds.
-fn median_ms(mut work: impl FnMut()) -> f64 {
-    let clock = Instant::now();
-    let once = Instant::now();
-    work();
-    let repeats = (RUN_MS / (once.elapsed().as_secs_f64() * 1e3))
-        .ceil()
-        .max(1.0) as u32;
-    let mut times: Vec<f64> = (0..RUNS)
-        .map(|_| {
-            let before = thread_ms(&clock);
-            (0..repeats).for_each(|_| work());
-            (thread_ms(&clock) - before) / f64::from(repeats)
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[RUNS / 2]
-}
-
-/// CPU time of this thread where the system tells it (Linux), so that a busy machine does not
-/// blur the figures; elsewhere the wall clock's.
-fn thread_ms(clock: &Instant) -> f64 {
-    std::fs::read_to_string("/proc/thread-self/schedstat")
-        .ok()
-        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
-        .map_or(clock.elapsed().as_secs_f64() * 1e3, |ns| ns * 1e-6)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 fn dearest(values: &[f64]) -> f64 {

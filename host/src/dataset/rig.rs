@@ -1,5 +1,6 @@
 //! `rig.toml`: where light, camera and target are.
 
+use gonia_brdf::Pose;
 use serde::{Deserialize, Serialize};
 
 /// The geometry of a rig and how its frames are sampled.
@@ -64,12 +65,63 @@ pub struct Target {
     pub material_half_mm: f64,
 }
 
-/// A Lambertian reference of known albedo.
+/// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
+pub enum Reference {
+    /// A Lambertian one: albedo per channel, 0 < ρ ≤ 1.
+    Reflectance([f64; 3]),
+    /// One whose reflectance depends on direction.
+    Table {
+        /// The table's CSV, relative to the rig's folder.
+        file: String,
+        /// Its rows, once [`read_rig`](super::rig_toml::read_rig) has read them.
+        table: ReflectanceTable,
+    },
+}
+
+/// Reflectance factors (π times the BRDF) by direction; never empty in a rig that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReflectanceTable {
+    /// By θi in degrees, in order.
+    ByIncidence(Vec<(f64, [f64; 3])>),
+    /// By light and view. A reference is taken as isotropic and reciprocal.
+    ByPose(Vec<(Pose, [f64; 3])>),
+}
+
+/// The keys of `[reference]`.
+#[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
-    /// Albedo per channel, 0 < ρ ≤ 1.
-    pub reflectance: [f64; 3],
+struct ReferenceKeys {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reflectance: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    table: Option<String>,
+}
+
+impl TryFrom<ReferenceKeys> for Reference {
+    type Error = &'static str;
+
+    fn try_from(keys: ReferenceKeys) -> Result<Self, Self::Error> {
+        match (keys.reflectance, keys.table) {
+            (Some(rho), None) => Ok(Self::Reflectance(rho)),
+            (None, Some(file)) => Ok(Self::Table {
+                file,
+                table: ReflectanceTable::ByIncidence(Vec::new()),
+            }),
+            _ => Err("[reference] needs either reflectance or table"),
+        }
+    }
+}
+
+impl From<Reference> for ReferenceKeys {
+    fn from(reference: Reference) -> Self {
+        let (reflectance, table) = match reference {
+            Reference::Reflectance(rho) => (Some(rho), None),
+            Reference::Table { file, .. } => (None, Some(file)),
+        };
+        Self { reflectance, table }
+    }
 }
 
 /// A linear sensor, for frames whose rows in `frames.csv` have an exposure time.

@@ -21,19 +21,21 @@ impl StripLine {
 
 /// Finds the strongest bright line within `search_px` of the prediction. Every Sobel edge votes,
 /// with its sign, for the lines through it; a bright line is where a rise is followed, one line's
-/// width further out, by a fall. Each station has the same say, however brightly it is lit.
+/// width further out, by a fall. `resolution` is the size of a bin in half widths of the line (of at
+/// least two pixels). Each station has the same say, however brightly it is lit.
 pub fn strongest_line(
     frame: &Frame,
     strip: &LineStrip,
     half_width_mm: f64,
     search_px: f64,
+    resolution: f64,
 ) -> Option<StripLine> {
     if strip.stations.is_empty() {
         return None;
     }
     // Sobel's own width keeps the two edges of a hair line about a pixel either side of it.
     let half_width = (half_width_mm * strip.px_per_mm()).max(1.0);
-    let bin = (0.5 * half_width).max(1.0);
+    let bin = resolution * half_width.max(2.0);
     let reach = search_px + half_width;
     let bins = (2.0 * reach / bin).ceil() as usize + 1;
     let max_slope = 0.5 * search_px;

@@ -9,6 +9,7 @@ mod lines;
 pub mod occlusion;
 mod profile;
 mod quantiles;
+pub mod rectify;
 mod refine;
 pub mod register;
 #[cfg(test)]
@@ -21,6 +22,7 @@ pub(crate) mod simulated;
 
 pub use camera::CameraModel;
 pub use homography::Homography;
+pub use ideal_light::IdealLight;
 pub use occlusion::Mask;
 pub use register::{PoseOffset, Reason, Registrar, Registration, State};
 pub use sampling::{LeftOut, PointValue, SamplingGrid};

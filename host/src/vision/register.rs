@@ -40,6 +40,8 @@ const MAX_DEVIATION: f64 = 6.0;
 const LOOSE_ARM_DEG: f64 = 0.5;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
+/// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
+const HOUGH_RESOLUTION: f64 = 0.5;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
 const SEARCH_WIDTHS: f64 = 0.02;
 /// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
@@ -52,6 +54,7 @@ const RELINEARIZE_PX: f64 = 1.5;
 pub struct Registrar {
     camera: CameraModel,
     target: Target,
+    hough_resolution: f64,
 }
 
 /// Where the target is in one frame.
@@ -137,7 +140,15 @@ impl Registrar {
         Self {
             camera: CameraModel::new(&rig.camera),
             target: rig.target.clone(),
+            hough_resolution: HOUGH_RESOLUTION,
         }
+    }
+
+    /// With another size of Hough's bins, in half widths of a line; 0.5 is the default.
+    #[must_use]
+    pub fn with_hough_resolution(mut self, half_widths: f64) -> Self {
+        self.hough_resolution = half_widths;
+        self
     }
 
     /// Registers a frame taken at the given reading of the arms. Never fails: without marks it
@@ -199,7 +210,9 @@ impl Registrar {
         let search_px = SEARCH_WIDTHS * width + 4.0;
         let strips = self.strips(frame, predicted, search_px);
         let half_width = 0.5 * self.target.line_width_mm;
-        let hough = [0, 1, 2, 3].map(|i| strongest_line(frame, &strips[i], half_width, search_px));
+        let hough = strips.each_ref().map(|strip| {
+            strongest_line(frame, strip, half_width, search_px, self.hough_resolution)
+        });
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the marks beside them.
             self.search(view, &strips, [None; 4]).map_err(|_| failure)
