@@ -22,8 +22,10 @@ const PX: usize = 512;
 const LIGHT: [f64; 2] = [30.0, 140.0];
 /// The arm's reading is off by this much in θ and in φ.
 const READING_OFF_DEG: f64 = 0.02;
-/// A lock whose samples are further off than this is a wrong one.
-const WRONG_DEG: f64 = 0.02;
+/// A lock that has a corner further off than this has taken something else for a mark, pixels.
+const WRONG_PX: f64 = 0.3;
+/// The samples of a frame that is as it should be are not further off than this, degrees.
+const TRUE_DEG: f64 = 0.02;
 
 const VIEWS: [[f64; 2]; 8] = [
     [0.0, 0.0],
@@ -176,7 +178,7 @@ fn cases() -> Vec<Case> {
         r if r > 0.999 => [40.0; 3],
         _ => v,
     };
-    let over: Change = |v, _, _, _| v.map(|c| if c > 0.15 { f32::INFINITY } else { c });
+    let over: Change = |v, _, _, _| v.map(|c| if c > 0.08 { f32::INFINITY } else { c });
     let noise: Change = |_, _, _, i| [random(i) as f32; 3];
     let room: Change = |_, p, _, _| {
         let wall = 0.3 + 0.001 * p[0];
@@ -280,6 +282,8 @@ struct Row {
     why: Vec<&'static str>,
     /// Largest error of a sample's direction, degrees.
     locked_deg: f64,
+    /// Largest error of a corner of the target, pixels.
+    locked_px: f64,
     by_pose_deg: f64,
     /// |ln(value / true value)| of all samples.
     errors: Vec<f64>,
@@ -426,41 +430,55 @@ fn look(
     if outcome == Outcome::Locked {
         row.locked += 1;
         row.locked_deg = row.locked_deg.max(worst);
+        for corner in [
+            [-335.0, -335.0],
+            [335.0, -335.0],
+            [335.0, 335.0],
+            [-335.0, 335.0],
+        ] {
+            let (a, b) = (found.project(corner), map.apply(corner));
+            row.locked_px = row.locked_px.max((a[0] - b[0]).hypot(a[1] - b[1]));
+        }
     } else {
         row.by_pose += 1;
         row.by_pose_deg = row.by_pose_deg.max(worst);
     }
 }
 
-fn judge(case: &Case, row: &Row) {
+/// What is wrong with a row, if anything is.
+fn judge(case: &Case, row: &Row) -> Option<String> {
     let name = case.name;
     let said = format!(
         "{name}: {} locked ({}), {} by pose ({}), {} refused",
         row.locked, row.locked_deg, row.by_pose, row.by_pose_deg, row.refused
     );
-    match case.must {
-        Must::BeBlind => {
-            assert_eq!(row.locked, VIEWS.len(), "{said}");
-            assert!((row.locked_deg - 90.0).abs() < 40.0, "{said}");
-            return;
-        }
-        Must::Use => assert_eq!(row.refused, 0, "{said}"),
-        Must::Refuse => assert_eq!(row.refused, VIEWS.len(), "{said}"),
-        Must::NotMistake => {}
-    }
-    assert!(row.locked_deg <= WRONG_DEG, "{said}");
+    let used = match case.must {
+        Must::BeBlind => row.locked == VIEWS.len() && (row.locked_deg - 90.0).abs() < 40.0,
+        Must::Use => row.refused == 0,
+        Must::Refuse => row.refused == VIEWS.len(),
+        Must::NotMistake => true,
+    };
     // By the pose the samples have the error of its reading: 0.02° in each of θ and φ.
-    assert!(row.by_pose_deg <= 1.5 * READING_OFF_DEG, "{said}");
+    let true_enough = case.must == Must::BeBlind
+        || row.locked_px <= WRONG_PX
+            && row.by_pose_deg <= 1.5 * READING_OFF_DEG
+            && (case.must != Must::Use || row.locked_deg <= TRUE_DEG);
+    (!(used && true_enough)).then_some(said)
 }
 
-fn document() -> String {
-    let mut text = String::from(HEAD);
+/// The table, and what is wrong in it.
+fn document() -> (String, Vec<String>) {
+    let (mut text, mut wrong) = (String::from(HEAD), Vec::new());
     for case in cases() {
         let mut row = run(&case);
-        judge(&case, &row);
+        wrong.extend(judge(&case, &row));
         let degrees = |n: usize, deg: f64| match n {
             0 => "–".to_owned(),
             _ => format!("{n} ({deg:.3}°)"),
+        };
+        let locked = match row.locked {
+            0 => "–".to_owned(),
+            n => format!("{n} ({:.3}°, {:.2} px)", row.locked_deg, row.locked_px),
         };
         row.errors.sort_by(f64::total_cmp);
         let share = |p: f64| row.errors.get((p * row.errors.len() as f64) as usize);
@@ -487,13 +505,12 @@ fn document() -> String {
         }
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {refused} | {value} | {left_out} |",
+            "| {} | {locked} | {} | {refused} | {value} | {left_out} |",
             case.name,
-            degrees(row.locked, row.locked_deg),
             degrees(row.by_pose, row.by_pose_deg),
         );
     }
-    text
+    (text, wrong)
 }
 
 const HEAD: &str = "\
@@ -502,11 +519,16 @@ const HEAD: &str = "\
 Written by `host/tests/vision_stability.rs`, which puts each case before registration and sampling at
 eight views (θv 0° to 75° where the row says no other; frames of 512 px, noise of 1 %, the arm's
 reading off by 0.02° in θ and φ), and fails when a row is not what happens, or when a lock is wrong:
-no sample of a locked frame may be off by more than 0.02° in the direction of light or camera.
+no corner of a locked target may be off by more than 0.3 px.
 
-*Locked*: the marks carry the frame; *by its pose*: some lines are hidden, what is seen agrees with
-the pose, and the arm's reading is used; in both with the largest error of a sample's direction.
-*Value*: |ln(value / what there was to see there)| of all samples, median and 95th percentile.
+*Locked*: the marks carry the frame; with the largest error of a sample's direction (to the light or
+to the camera, the worse) and of a corner. *By its pose*: some lines are hidden, what is seen agrees
+with the pose, and the arm's reading is used, with its error. *Value*: |ln(value / what there was to
+see there)| of all samples, median and 95th percentile; at θv = 75° a patch has some 12 pixels here.
+
+At grazing views the frame's own resolution is the limit: at θv = 86° a pixel is 32 mm of the target.
+A light that falls along a whole line moves it, and a tenth of a pixel of that cannot be told from the
+camera's own sag.
 
 One row is not as one would wish: four equal lines make a square, and a square turned by 90° is the
 same square. No frame can tell; the samples' azimuths are then off by 90°. Mark the sample itself.
@@ -517,8 +539,9 @@ same square. No frame can tell; the samples' azimuths are then off by 90°. Mark
 
 #[test]
 fn no_frame_is_locked_wrongly_and_the_table_says_what_becomes_of_it() {
-    let text = document();
+    let (text, wrong) = document();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/vision.md");
+    assert!(wrong.is_empty(), "{wrong:#?}\n{text}");
     if std::env::var_os("GONIA_UPDATE_DOCS").is_some() {
         std::fs::write(&path, &text).unwrap();
     }

@@ -91,13 +91,14 @@ fn both_ways(rows: &[(Pose, [f64; 3])]) -> Vec<(Vec3, Vec3, [f64; 3])> {
         .collect()
 }
 
-/// Shepard's mean: weights 1/d⁴, so that rows rule their own neighbourhood.
+/// Shepard's mean: weights 1/d⁶, so that in three dimensions the near rows outweigh the many far
+/// ones.
 fn weighted_mean(rows: &[(Vec3, Vec3, [f64; 3])], light: Vec3, view: Vec3) -> [f64; 3] {
     let core2 = CORE_DEG.to_radians().powi(2);
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (l, v, rho) in rows {
         let distance2 = 4.0 - 2.0 * (dot(*l, light) + dot(*v, view)) + core2;
-        let weight = 1.0 / (distance2 * distance2);
+        let weight = distance2.powi(-3);
         total += weight;
         for c in 0..3 {
             sum[c] += weight * rho[c];

@@ -27,6 +27,9 @@ const MODEL_PX_PER_1000: f64 = 0.05;
 const MODEL_PX: f64 = 0.02;
 /// Floor of a line's own standard error, pixels.
 const LINE_FLOOR_PX: f64 = 0.003;
+/// Its standard error where a pixel of desk is between line and material, pixels; it grows with the
+/// fourth power as that shrinks and each can stand in for the other.
+const CROWDED_PX: f64 = 0.04;
 /// Lines that the moved camera misses by more than this share of the width are not the target's.
 const MISFIT_WIDTHS: f64 = 6e-4;
 /// Nothing is believed of a frame in which fewer lines are seen.
@@ -215,7 +218,12 @@ impl Registrar {
         });
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the marks beside them.
-            self.search(view, &strips, [None; 4]).map_err(|_| failure)
+            let again = self.search(view, &strips, [None; 4]);
+            again.map_err(|second| match second.reason {
+                // Hidden lines, and others where the pose has them: that says more.
+                Reason::LinesMissing { found } if found > 0 => second,
+                _ => failure,
+            })
         })
     }
 
@@ -243,6 +251,11 @@ impl Registrar {
         let fit = fit_lines(strips, &Starts::Around(hough), &self.target);
         let found = fit.lines.iter().flatten().count();
         if found < MIN_LINES {
+            // Even those few must be where the pose has them, or they are something else.
+            let estimate = self.estimate(view, strips, &fit.lines, &self.trust(ARM_DEG));
+            if found > 0 && estimate.surprise > MAX_SURPRISE {
+                return Err(Failure::new(estimate.wrong_layout(), &fit));
+            }
             return Err(Failure::new(Reason::LinesMissing { found }, &fit));
         }
         let estimate = self.best_estimate(view, strips, &fit.lines);
@@ -352,7 +365,7 @@ impl Registrar {
                 for c in 0..2 {
                     covariance[(2 * row + r, 2 * row + c)] += own[r][c];
                 }
-                covariance[(2 * row + r, 2 * row + r)] += LINE_FLOOR_PX * LINE_FLOOR_PX;
+                covariance[(2 * row + r, 2 * row + r)] += self.line_variance(&strips[pair[0] / 2]);
             }
         }
         let failed = Estimate {
@@ -404,6 +417,15 @@ impl Registrar {
             misfit_px: residual.norm() / (n as f64).sqrt(),
             camera_deviation: p.rows(2, 4).amax(),
         }
+    }
+
+    /// What a line's place is trusted to at best, px².
+    fn line_variance(&self, strip: &LineStrip) -> f64 {
+        let gap_mm = self.target.line_offset_mm
+            - self.target.material_half_mm
+            - 0.5 * self.target.line_width_mm;
+        let gap_px = (gap_mm * strip.px_per_mm()).max(1e-3);
+        LINE_FLOOR_PX.powi(2) + (CROWDED_PX * gap_px.powi(-4)).powi(2)
     }
 
     fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {
