@@ -143,8 +143,8 @@ fn curves(svg: &mut String, line: &Line) {
             svg,
             at,
             HEIGHT - 26.0,
-            "middle",
-            &format!("{:.3} {}", value(x), line.x),
+            if share == 1.0 { "end" } else { "middle" },
+            &format!("{:.1} {}", value(x), line.x),
         );
         let at = HEIGHT - 40.0 - (HEIGHT - 70.0) * share;
         text(svg, 37.0, at + 3.0, "end", &format!("{:.3}", value(y)));

@@ -27,8 +27,8 @@ const MODEL_PX_PER_1000: f64 = 0.05;
 const MODEL_PX: f64 = 0.02;
 /// Floor of a line's own standard error, pixels.
 const LINE_FLOOR_PX: f64 = 0.003;
-/// Its standard error where a pixel of desk is between line and material, pixels; it grows with the
-/// fourth power as that shrinks and each can stand in for the other.
+/// With less than a pixel of desk between line and material each can stand in for the other: this
+/// many pixels, times 1/gap⁴ − 1, come on top.
 const CROWDED_PX: f64 = 0.04;
 /// Lines that the moved camera misses by more than this share of the width are not the target's.
 const MISFIT_WIDTHS: f64 = 6e-4;
@@ -425,7 +425,8 @@ impl Registrar {
             - self.target.material_half_mm
             - 0.5 * self.target.line_width_mm;
         let gap_px = (gap_mm * strip.px_per_mm()).max(1e-3);
-        LINE_FLOOR_PX.powi(2) + (CROWDED_PX * gap_px.powi(-4)).powi(2)
+        let crowded = CROWDED_PX * (gap_px.powi(-4) - 1.0).max(0.0);
+        LINE_FLOOR_PX.powi(2) + crowded * crowded
     }
 
     fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {
