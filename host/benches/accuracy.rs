@@ -4,6 +4,8 @@
 //! `accuracy.csv` and `accuracy.svg` (error by θi, θv and distance from the disc's centre) and
 //! `accuracy_cost.csv` and `accuracy_cost.svg` (time against scatter over patch and resolution).
 
+#![allow(clippy::expect_used)]
+
 use gonia::dataset::{Frame, Rig};
 use gonia::vision::camera::CameraShift;
 use gonia::vision::{CameraModel, IdealLight, Registrar, Registration, SamplingGrid, State};
@@ -323,8 +325,8 @@ fn cost(out: &Path) {
                 let at = pose(a, b, c, d);
                 let frame = render(&noisy, at, shot as u64);
                 let found = registrar.register(&frame, at);
-                register.push(median_ms(|| drop(registrar.register(&frame, at))));
-                sample.push(median_ms(|| drop(grid.sample(&frame, &found, None))));
+                register.push(median_ms(|| registrar.register(&frame, at)));
+                sample.push(median_ms(|| grid.sample(&frame, &found, None)));
                 noise_errors.extend(errors(&noisy, &rig, at, shot as u64));
                 clean_errors.extend(errors(&clean, &rig, at, shot as u64));
             }
@@ -379,7 +381,7 @@ fn hough() {
                     let found = registrar.register(&frame, reading);
                     locked += usize::from(found.state == State::Locked);
                     if k == 4 {
-                        times.push(median_ms(|| drop(registrar.register(&frame, reading))));
+                        times.push(median_ms(|| registrar.register(&frame, reading)));
                     }
                 }
             }

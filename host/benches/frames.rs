@@ -3,6 +3,8 @@
 //! `cargo bench -p gonia --bench frames [-- PX...]`: CPU time of one thread, the median of several
 //! runs for each pose, then the mean over the poses (and the dearest pose).
 
+#![allow(clippy::expect_used)]
+
 use gonia::dataset::frame_exr::{read_frame, write_frame};
 use gonia::dataset::{Frame, Rig};
 use gonia::vision::occlusion::find_occlusion;

@@ -1,5 +1,6 @@
 //! CPU time of one thread.
 
+use std::hint::black_box;
 use std::time::Instant;
 
 /// Runs of which the median counts.
@@ -9,17 +10,17 @@ const RUN_MS: f64 = 150.0;
 
 /// Median of this thread's CPU milliseconds over a few runs, each long enough for the system's
 /// clock, which may tick only every few milliseconds.
-pub fn median_ms(mut work: impl FnMut()) -> f64 {
+pub fn median_ms<T>(mut work: impl FnMut() -> T) -> f64 {
     let clock = Instant::now();
     let once = Instant::now();
-    work();
+    black_box(work());
     let repeats = (RUN_MS / (once.elapsed().as_secs_f64() * 1e3))
         .ceil()
         .max(1.0) as u32;
     let mut times: Vec<f64> = (0..RUNS)
         .map(|_| {
             let before = thread_ms(&clock);
-            (0..repeats).for_each(|_| work());
+            (0..repeats).for_each(|_| drop(black_box(work())));
             (thread_ms(&clock) - before) / f64::from(repeats)
         })
         .collect();

@@ -7,6 +7,7 @@ mod hough;
 pub mod ideal_light;
 mod lines;
 pub mod occlusion;
+mod patch;
 mod profile;
 mod quantiles;
 pub mod rectify;

@@ -1,6 +1,7 @@
 //! The values at the grid points of a frame: medians over the pixels of projected patches.
 
 use super::occlusion::Mask;
+use super::patch::Patch;
 use super::quantiles::{Workspace, median_and_spread};
 use super::register::Registration;
 use crate::dataset::{Frame, Rig};
@@ -92,7 +93,7 @@ impl SamplingGrid {
             mask,
             patch_half: 0.5 * self.patch_mm,
             limit: self.material_half_mm,
-            channels: [Vec::new(), Vec::new(), Vec::new()],
+            patch: Patch::default(),
             room: Workspace::default(),
         };
         self.points_mm.iter().map(|p| sampler.point(*p)).collect()
@@ -105,7 +106,7 @@ struct Sampler<'a> {
     mask: Option<&'a Mask>,
     patch_half: f64,
     limit: f64,
-    channels: [Vec<f32>; 3],
+    patch: Patch,
     room: Workspace,
 }
 
@@ -123,9 +124,7 @@ impl Sampler<'_> {
         if !corners.iter().all(inside) {
             return Err(LeftOut::Border);
         }
-        for channel in &mut self.channels {
-            channel.clear();
-        }
+        self.patch.clear();
         let mut sum = [0.0; 2];
         for (row, columns) in Rows::of(&corners) {
             if self.mask.is_some_and(|mask| mask.hides_any(&columns, row)) {
@@ -135,15 +134,13 @@ impl Sampler<'_> {
             sum[0] += n * 0.5 * (columns.start + columns.end) as f64;
             sum[1] += n * (row as f64 + 0.5);
             let start = row * self.frame.width;
-            let pixels = &self.frame.rgb[start + columns.start..start + columns.end];
-            for (c, channel) in self.channels.iter_mut().enumerate() {
-                channel.extend(pixels.iter().map(|rgb| rgb[c]));
-            }
+            self.patch
+                .extend(&self.frame.rgb[start + columns.start..start + columns.end]);
         }
-        if let Some(reason) = self.unusable() {
-            return Err(reason);
+        if !self.patch.is_finite() {
+            return Err(reason_of(self.patch.values()));
         }
-        let pixels = self.channels[0].len();
+        let pixels = self.patch.len();
         if pixels < FEWEST_PIXELS {
             return self.interpolated(at);
         }
@@ -152,24 +149,10 @@ impl Sampler<'_> {
         Ok(self.value(seen, pixels as u32))
     }
 
-    /// Why the values gathered are no radiance, if they are not.
-    fn unusable(&self) -> Option<LeftOut> {
-        // All bits of the exponent are set in infinities and in what is no number: one more of it
-        // carries into the sign.
-        let carry = |v: &f32| (v.to_bits() & 0x7fff_ffff) + 0x0080_0000;
-        let bits = |channel: &Vec<f32>| channel.iter().fold(0, |bits, v| bits | carry(v));
-        if self.channels.iter().all(|channel| bits(channel) >> 31 == 0) {
-            return None;
-        }
-        Some(reason_of(self.channels.iter().flatten().copied()))
-    }
-
     /// Median over points spread evenly over a patch of hardly any pixels, each bilinear between
     /// its four pixels: centred on the grid point, so that no offset is left.
     fn interpolated(&mut self, at: [f64; 2]) -> Result<PointValue, LeftOut> {
-        for channel in &mut self.channels {
-            channel.clear();
-        }
+        self.patch.clear();
         let place = |i: usize| self.patch_half * ((2 * i + 1) as f64 / POINTS_A_SIDE as f64 - 1.0);
         let size = [self.frame.width, self.frame.height];
         for k in 0..POINTS_A_SIDE * POINTS_A_SIDE {
@@ -200,9 +183,7 @@ impl Sampler<'_> {
             if !worst.iter().all(|v| v.is_finite()) {
                 return Err(reason_of(worst.into_iter()));
             }
-            for (channel, v) in self.channels.iter_mut().zip(value) {
-                channel.push(v);
-            }
+            self.patch.extend(&[value]);
         }
         Ok(self.value([0.0; 2], 0))
     }
@@ -228,7 +209,7 @@ impl Sampler<'_> {
     fn value(&mut self, offset_mm: [f32; 2], pixels: u32) -> PointValue {
         let (mut rgb, mut spread) = ([0.0; 3], [0.0; 3]);
         for c in 0..3 {
-            (rgb[c], spread[c]) = median_and_spread(&mut self.channels[c], &mut self.room);
+            (rgb[c], spread[c]) = median_and_spread(self.patch.channel(c), &mut self.room);
         }
         PointValue {
             rgb,
