@@ -7,6 +7,7 @@ pub mod capture;
 pub mod cli;
 pub mod dataset;
 pub mod evaluate;
+pub mod hdr;
 pub mod link;
 pub mod plan;
 pub mod process;

@@ -10,6 +10,7 @@ mod process;
 mod progress;
 mod provenance;
 mod query;
+mod rectify;
 mod report;
 mod sim_device;
 mod table;
@@ -36,6 +37,8 @@ enum Command {
     Plan(plan::Plan),
     /// Frames of a capture folder → samples
     Process(process::Process),
+    /// One frame as seen from straight above, or merged from its exposures
+    Rectify(rectify::Rectify),
     /// Samples → bins → dense BRDF
     Fill(fill::Fill),
     /// Values of a dense BRDF at directions read from standard input
@@ -72,6 +75,7 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Demo(command) => command.run(),
         Command::Plan(command) => command.run(),
         Command::Process(command) => command.run(),
+        Command::Rectify(command) => command.run(),
         Command::Fill(command) => command.run(),
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),

@@ -5,7 +5,7 @@ use super::table;
 use crate::dataset::samples::write_samples;
 use crate::dataset::summary::{FrameCounts, Refused};
 use crate::dataset::{CaptureFolder, Rig, Role, Scale, check_writable};
-use crate::process::{self, Compensation, FrameSource, Outcome, Processed, Stage};
+use crate::process::{self, Compensation, FrameSource, Masks, Outcome, Processed, Stage};
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Registers each frame from its marks, samples it, and compensates by the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig."
+    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig. Raw exposures\n(PNG of 8 or 16 bits: mono, Bayer or RGB) have an exposure_s as well; rows of one frame and role are\nmerged by the [sensor] of rig.toml."
 )]
 pub struct Process {
     /// The capture folder
@@ -21,7 +21,14 @@ pub struct Process {
     /// Where to write the samples, .npy or .csv [default: DIR/samples.npy]
     #[arg(short, long, value_name = "SAMPLES")]
     output: Option<PathBuf>,
+    /// Occlusion masks of another session's reference, for poses without a reference frame
+    /// [default: DIR/masks.csv if it is there]
+    #[arg(long, value_name = "CSV")]
+    masks: Option<PathBuf>,
 }
+
+/// Beside the samples of a session with reference frames: what hid the target in them.
+const MASKS: &str = "masks.csv";
 
 impl Process {
     /// Runs the command.
@@ -30,12 +37,21 @@ impl Process {
         let output = self
             .output
             .unwrap_or_else(|| self.folder.join("samples.npy"));
-        check_writable(super::fill::folder_of(&output))?;
+        let beside = super::fill::folder_of(&output).to_owned();
+        check_writable(&beside)?;
+        let kept = self.folder.join(MASKS);
+        let masks = match self.masks.or(kept.is_file().then_some(kept)) {
+            Some(path) => Masks::read(&path, folder.rig())?,
+            None => Masks::default(),
+        };
         let mut progress = Progress::new();
-        let processed = run(folder.rig(), &folder, &mut progress)?;
+        let processed = run_with_masks(folder.rig(), &folder, &masks, &mut progress)?;
         progress.stage("writing samples", |_| {
             write_samples(&output, &processed.samples)
         })?;
+        if !processed.masks.is_empty() {
+            processed.masks.write(&beside.join(MASKS), folder.rig())?;
+        }
         let mut rows = describe(&processed);
         rows.push(("written".into(), output.display().to_string()));
         table::print(&rows);
@@ -45,11 +61,20 @@ impl Process {
 
 /// The chain from frames to samples, with a bar.
 pub fn run(rig: &Rig, source: &dyn FrameSource, progress: &mut Progress) -> Result<Processed> {
+    run_with_masks(rig, source, &Masks::default(), progress)
+}
+
+fn run_with_masks(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    masks: &Masks,
+    progress: &mut Progress,
+) -> Result<Processed> {
     let of_role = |role| source.rows().iter().filter(|row| row.role == role).count();
     let reference = of_role(Role::Reference);
     let total = source.rows().len().max(1);
     let processed = progress.stage("frames to samples", |tell| {
-        process::process(rig, source, &|stage, done, _| {
+        process::process_with_masks(rig, source, masks, &|stage, done, _| {
             let before = match stage {
                 Stage::Reference => 0,
                 Stage::Material => reference,
@@ -147,12 +172,13 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
         (
             "samples".into(),
             format!(
-                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} not finite)",
+                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} saturated, {} not finite)",
                 table::count(processed.samples.len() as u64),
                 table::count(left_out.total()),
                 table::count(left_out.occlusion),
                 table::count(left_out.dark_reference + left_out.below_horizon),
                 table::count(left_out.mark + left_out.border),
+                table::count(left_out.saturated),
                 table::count(left_out.not_finite)
             ),
         ),

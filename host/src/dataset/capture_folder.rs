@@ -1,9 +1,10 @@
 //! A capture folder: `rig.toml`, `frames.csv` and the frames they speak of.
 
 use super::frame_exr::read_frame_of_size;
-use super::frames_csv::{FrameRow, read_frames_csv};
+use super::frames_csv::{Exposure, FrameList, FrameRow, Role, read_frames_csv};
 use super::rig_toml::read_rig;
 use super::{FileError, Frame, Rig};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// The frames of a session of any rig, to be loaded one by one.
@@ -12,6 +13,8 @@ pub struct CaptureFolder {
     folder: PathBuf,
     rig: Rig,
     rows: Vec<FrameRow>,
+    /// The raw exposures of frames that have any.
+    exposures: HashMap<(u32, Role), Vec<Exposure>>,
 }
 
 impl CaptureFolder {
@@ -30,7 +33,7 @@ impl CaptureFolder {
         }
         let rig = read_rig(&folder.join("rig.toml"))?;
         let list = folder.join("frames.csv");
-        let rows = read_frames_csv(&list)?;
+        let FrameList { rows, exposures } = read_frames_csv(&list)?;
         if rows.is_empty() {
             return Err(FileError::new(
                 &list,
@@ -38,20 +41,28 @@ impl CaptureFolder {
                 "capture some frames first",
             ));
         }
-        for row in &rows {
-            if !folder.join(&row.file).is_file() {
+        for (row, bracket) in rows.iter().zip(&exposures) {
+            let files = bracket.iter().map(|e| &e.file).chain([&row.file]);
+            if let Some(missing) = files.into_iter().find(|f| !folder.join(f).is_file()) {
                 return Err(FileError::new(
                     &list,
-                    format_args!("there is no file \"{}\"", row.file),
+                    format_args!("there is no file \"{missing}\""),
                     "restore it, or remove its row",
                 )
                 .at(format_args!("{} frame {}", row.role.name(), row.frame)));
             }
         }
+        let exposures = rows
+            .iter()
+            .zip(exposures)
+            .filter(|(_, bracket)| !bracket.is_empty())
+            .map(|(row, bracket)| ((row.frame, row.role), bracket))
+            .collect();
         Ok(Self {
             folder: folder.to_owned(),
             rig,
             rows,
+            exposures,
         })
     }
 
@@ -65,12 +76,24 @@ impl CaptureFolder {
         &self.rows
     }
 
-    /// Where a frame's file is.
-    pub fn path_of(&self, row: &FrameRow) -> PathBuf {
-        self.folder.join(&row.file)
+    /// The raw exposures of a frame; none when its file is one of linear radiance.
+    pub fn exposures(&self, row: &FrameRow) -> &[Exposure] {
+        self.exposures
+            .get(&(row.frame, row.role))
+            .map_or(&[], Vec::as_slice)
     }
 
-    /// Loads one frame. Frames may be loaded from many threads at once.
+    /// Where a frame's file is, or the first of its bracket.
+    pub fn path_of(&self, row: &FrameRow) -> PathBuf {
+        self.path_of_file(&row.file)
+    }
+
+    /// Where a file of the folder is.
+    pub fn path_of_file(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+
+    /// Loads one frame of linear radiance (brackets: [`crate::hdr::load_bracket`]). Frames may be loaded from many threads at once.
     ///
     /// # Errors
     /// One line naming the file: see [`read_frame_of_size`].

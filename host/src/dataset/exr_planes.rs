@@ -8,6 +8,7 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
     MetaData, ReadChannels, ReadLayers, Text, WritableImage,
 };
+use half::slice::HalfFloatSliceExt;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
@@ -33,6 +34,14 @@ pub(super) enum Plane {
 }
 
 impl Plane {
+    /// Copies values from `start` on into `out`.
+    pub fn copy_to(&self, start: usize, out: &mut [f32]) {
+        match self {
+            Plane::F32(values) => out.copy_from_slice(&values[start..start + out.len()]),
+            Plane::F16(values) => values[start..start + out.len()].convert_to_f32_slice(out),
+        }
+    }
+
     /// In single precision; moved, not copied, where it already is.
     pub fn into_f32(self) -> Vec<f32> {
         match self {

@@ -1,6 +1,6 @@
 //! A frame in memory.
 
-/// Linear radiance, RGB, row by row from the top left.
+/// Linear radiance, RGB, row by row from the top left. +∞ marks what was too bright for the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Pixels a row.

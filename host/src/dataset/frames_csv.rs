@@ -3,8 +3,10 @@
 use super::FileError;
 use super::csv_table::CsvTable;
 use super::whole_file::write_whole;
-use gonia_brdf::Pose;
-use std::collections::HashSet;
+use gonia_brdf::direction::angle_between;
+use gonia_brdf::{Direction, Pose};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::io::Write;
 use std::path::{Component, Path};
 
@@ -36,16 +38,40 @@ pub struct FrameRow {
     pub role: Role,
     /// The arms' reading.
     pub pose: Pose,
-    /// Path of the EXR, relative to the capture folder.
+    /// Path of the EXR, or of a bracket's first exposure, relative to the capture folder.
     pub file: String,
 }
 
-/// Reads `frames.csv`. Columns are found by name, in any order; others are ignored.
+/// A raw exposure of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exposure {
+    /// Path of its PNG, relative to the capture folder.
+    pub file: String,
+    /// How long it took, seconds.
+    pub exposure_s: f64,
+}
+
+/// The frames of a capture folder.
+#[derive(Clone, Debug, Default)]
+pub struct FrameList {
+    /// One row a frame, in the order of their first rows.
+    pub rows: Vec<FrameRow>,
+    /// The raw exposures of each of them; none for a frame of linear radiance.
+    pub exposures: Vec<Vec<Exposure>>,
+}
+
+/// Exposures of one frame must have been taken at one pose, to this many degrees.
+const SAME_POSE_DEG: f64 = 0.03;
+
+/// Reads `frames.csv`. Columns are found by name, in any order; others are ignored. Rows with a
+/// number in the optional column `exposure_s` are raw exposures; those of one frame and role make a
+/// bracket.
 ///
 /// # Errors
 /// One line naming the file and its line: a missing column, a number that is none, an elevation
-/// outside 0° ≤ θ < 90°, an unknown role, a frame named twice, or a path that leaves the folder.
-pub fn read_frames_csv(path: &Path) -> Result<Vec<FrameRow>, FileError> {
+/// outside 0° ≤ θ < 90°, an unknown role, a frame named twice that is no bracket or whose arms
+/// moved, an exposure time that is not positive, or a path that leaves the folder.
+pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
     let mut table = CsvTable::open(path)?;
     let [frame, role, theta_i, phi_i, theta_v, phi_v, file] = [
         table.column("frame")?,
@@ -56,8 +82,9 @@ pub fn read_frames_csv(path: &Path) -> Result<Vec<FrameRow>, FileError> {
         table.column("phi_v_deg")?,
         table.column("file")?,
     ];
-    let mut rows = Vec::new();
-    let mut seen = HashSet::new();
+    let exposure = table.optional_column("exposure_s")?;
+    let mut list = FrameList::default();
+    let mut places = HashMap::new();
     while table.next_row()? {
         let row = FrameRow {
             frame: table.number(frame)?,
@@ -68,15 +95,63 @@ pub fn read_frames_csv(path: &Path) -> Result<Vec<FrameRow>, FileError> {
             },
             file: parse_file(&table, file)?,
         };
-        if !seen.insert((row.frame, row.role)) {
-            return Err(table.wrong(
-                format_args!("{} frame {} is there twice", row.role.name(), row.frame),
-                "number the frames of a role differently",
-            ));
+        let exposure = exposure_of(&table, exposure, &row.file)?;
+        let name = format!("{} frame {}", row.role.name(), row.frame);
+        match places.entry((row.frame, row.role)) {
+            Entry::Vacant(place) => {
+                place.insert(list.rows.len());
+                list.rows.push(row);
+                list.exposures.push(exposure.into_iter().collect());
+            }
+            Entry::Occupied(place) => {
+                let place = *place.get();
+                let bracket = &mut list.exposures[place];
+                let (Some(exposure), false) = (exposure, bracket.is_empty()) else {
+                    return Err(table.wrong(
+                        format_args!("{name} is there twice"),
+                        "number the frames of a role differently, or give each exposure of a bracket its exposure_s",
+                    ));
+                };
+                if !is_same(list.rows[place].pose, row.pose) {
+                    return Err(table.wrong(
+                        format_args!("the arms moved between the exposures of {name}"),
+                        "give the exposures of a bracket one pose, and other poses another number",
+                    ));
+                }
+                bracket.push(exposure);
+            }
         }
-        rows.push(row);
     }
-    Ok(rows)
+    Ok(list)
+}
+
+fn exposure_of(
+    table: &CsvTable,
+    column: Option<usize>,
+    file: &str,
+) -> Result<Option<Exposure>, FileError> {
+    let Some(column) = column else {
+        return Ok(None);
+    };
+    if table.text(column)?.is_empty() {
+        return Ok(None);
+    }
+    let exposure_s: f64 = table.number(column)?;
+    if !(exposure_s > 0.0 && exposure_s.is_finite()) {
+        return Err(table.wrong(
+            format_args!("exposure_s {exposure_s} is not a time"),
+            "give seconds above 0, or nothing for a frame of linear radiance",
+        ));
+    }
+    Ok(Some(Exposure {
+        file: file.to_owned(),
+        exposure_s,
+    }))
+}
+
+fn is_same(a: Pose, b: Pose) -> bool {
+    let apart = |a: Direction, b: Direction| angle_between(a.to_vec3(), b.to_vec3()).to_degrees();
+    apart(a.light, b.light) <= SAME_POSE_DEG && apart(a.view, b.view) <= SAME_POSE_DEG
 }
 
 fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
@@ -160,7 +235,6 @@ impl std::fmt::Display for Quoted<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_brdf::Direction;
 
     const HEADER: &str = "frame,role,theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg,file\n";
 
@@ -168,7 +242,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frames.csv");
         std::fs::write(&path, text).unwrap();
-        read_frames_csv(&path)
+        Ok(read_frames_csv(&path)?.rows)
     }
 
     #[test]
@@ -189,7 +263,7 @@ mod tests {
             row(0, Role::Reference, 85.123457, 359.9, "frames/a, b.exr"),
         ];
         write_frames_csv(&path, &rows).unwrap();
-        let back = read_frames_csv(&path).unwrap();
+        let back = read_frames_csv(&path).unwrap().rows;
         for (a, b) in rows.iter().zip(&back) {
             assert_eq!((a.frame, a.role, &a.file), (b.frame, b.role, &b.file));
             assert!((a.pose.light.theta - b.pose.light.theta).abs() < 1e-8);
@@ -214,6 +288,49 @@ mod tests {
         assert_eq!(rows[0].file, "f/1.exr");
         assert!((rows[0].pose.light.phi_deg() - 60.0).abs() < 1e-9);
         assert!((rows[0].pose.view.phi_deg() - 270.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rows_with_exposure_times_make_brackets() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        let header = HEADER.replace("file", "file,exposure_s");
+        let read = |rows: &str| {
+            std::fs::write(&path, format!("{header}{rows}")).unwrap();
+            read_frames_csv(&path)
+        };
+        let list = read(
+            "0,material,1,2,3,4,a.png,0.1\n\
+             1,material,5,2,3,4,b.exr,\n\
+             0,reference,1,2,3,4,r.png,1\n\
+             0,material,1,2,3,4.02,c.png,0.4\n",
+        )
+        .unwrap();
+        assert_eq!(list.rows.len(), 3);
+        let files = |i: usize| -> Vec<(&str, f64)> {
+            list.exposures[i]
+                .iter()
+                .map(|e| (e.file.as_str(), e.exposure_s))
+                .collect()
+        };
+        assert_eq!(files(0), [("a.png", 0.1), ("c.png", 0.4)]);
+        assert_eq!(files(1), []);
+        assert_eq!(files(2), [("r.png", 1.0)]);
+        for (row, said) in [
+            ("0,material,1,2,3,4,c.png,0", "exposure_s 0 is not a time"),
+            (
+                "0,material,1,2,3,4,c.png,",
+                "material frame 0 is there twice",
+            ),
+            (
+                "0,material,1,2,3.1,4,c.png,1",
+                "the arms moved between the exposures of material frame 0",
+            ),
+        ] {
+            let error = read(&format!("0,material,1,2,3,4,a.png,0.1\n{row}\n")).unwrap_err();
+            let error = error.to_string();
+            assert!(error.contains("line 3") && error.contains(said), "{error}");
+        }
     }
 
     #[test]

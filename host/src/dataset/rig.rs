@@ -1,5 +1,6 @@
 //! `rig.toml`: where light, camera and target are.
 
+use gonia_brdf::Pose;
 use serde::{Deserialize, Serialize};
 
 /// The geometry of a rig and how its frames are sampled.
@@ -15,6 +16,9 @@ pub struct Rig {
     /// The reference's reflectance, where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<Reference>,
+    /// The sensor, where frames come as raw exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<Sensor>,
     /// The grid of sampling points.
     pub sampling: Sampling,
 }
@@ -61,12 +65,103 @@ pub struct Target {
     pub material_half_mm: f64,
 }
 
-/// A Lambertian reference of known albedo.
+/// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
+pub enum Reference {
+    /// A Lambertian one: albedo per channel, 0 < ρ ≤ 1.
+    Reflectance([f64; 3]),
+    /// One whose reflectance depends on direction.
+    Table {
+        /// The table's CSV, relative to the rig's folder.
+        file: String,
+        /// Its rows, once [`read_rig`](super::rig_toml::read_rig) has read them.
+        table: ReflectanceTable,
+    },
+}
+
+/// Reflectance factors (π times the BRDF) by direction; never empty in a rig that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReflectanceTable {
+    /// By θi in degrees, in order.
+    ByIncidence(Vec<(f64, [f64; 3])>),
+    /// By light and view. A reference is taken as isotropic and reciprocal.
+    ByPose(Vec<(Pose, [f64; 3])>),
+}
+
+/// The keys of `[reference]`.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReferenceKeys {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reflectance: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    table: Option<String>,
+}
+
+impl TryFrom<ReferenceKeys> for Reference {
+    type Error = &'static str;
+
+    fn try_from(keys: ReferenceKeys) -> Result<Self, Self::Error> {
+        match (keys.reflectance, keys.table) {
+            (Some(rho), None) => Ok(Self::Reflectance(rho)),
+            (None, Some(file)) => Ok(Self::Table {
+                file,
+                table: ReflectanceTable::ByIncidence(Vec::new()),
+            }),
+            _ => Err("[reference] needs either reflectance or table"),
+        }
+    }
+}
+
+impl From<Reference> for ReferenceKeys {
+    fn from(reference: Reference) -> Self {
+        let (reflectance, table) = match reference {
+            Reference::Reflectance(rho) => (Some(rho), None),
+            Reference::Table { file, .. } => (None, Some(file)),
+        };
+        Self { reflectance, table }
+    }
+}
+
+/// A linear sensor, for frames whose rows in `frames.csv` have an exposure time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
-    /// Albedo per channel, 0 < ρ ≤ 1.
-    pub reflectance: [f64; 3],
+pub struct Sensor {
+    /// Counts without light.
+    pub black_counts: f64,
+    /// Counts at and above which the sensor is no longer linear.
+    pub saturation_counts: f64,
+    /// Electrons a count: what shot noise follows from.
+    pub gain_e_per_count: f64,
+    /// Standard deviation of the read noise, electrons.
+    pub read_noise_e: f64,
+    /// The colour filters; without them a grey frame is that of a mono sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bayer: Option<Bayer>,
+}
+
+/// Colour filters of the top left 2 × 2 photosites, row by row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+#[allow(missing_docs)]
+pub enum Bayer {
+    Rggb,
+    Bggr,
+    Grbg,
+    Gbrg,
+}
+
+impl Bayer {
+    /// Channel (0 red, 1 green, 2 blue) by row and column.
+    pub fn colors(self) -> [[usize; 2]; 2] {
+        match self {
+            Bayer::Rggb => [[0, 1], [1, 2]],
+            Bayer::Bggr => [[2, 1], [1, 0]],
+            Bayer::Grbg => [[1, 0], [2, 1]],
+            Bayer::Gbrg => [[1, 2], [0, 1]],
+        }
+    }
 }
 
 /// The sampling points of a frame.
@@ -106,6 +201,7 @@ impl Rig {
                 material_half_mm: 320.0,
             },
             reference: None,
+            sensor: None,
             sampling: Sampling {
                 disc_radius_mm: 277.0,
                 grid_mm: 14.0,

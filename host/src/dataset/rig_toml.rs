@@ -1,6 +1,7 @@
 //! `rig.toml`: reading, checking and writing a [`Rig`].
 
-use super::rig::Rig;
+use super::reflectance_csv::read_reflectance;
+use super::rig::{Reference, Rig, Sensor};
 use super::whole_file::write_whole_bytes;
 use super::{FileError, toml_text};
 use std::ops::RangeInclusive;
@@ -15,7 +16,10 @@ const REMEDY: &str = "see the rig.toml of the README for the keys and their unit
 /// mistyped key, or a value that no rig has (a distance of zero, a sample larger than its marks, a
 /// reflectance above one).
 pub fn read_rig(path: &Path) -> Result<Rig, FileError> {
-    let rig: Rig = toml_text::read(path, REMEDY)?;
+    let mut rig: Rig = toml_text::read(path, REMEDY)?;
+    if let Some(Reference::Table { file, table }) = &mut rig.reference {
+        *table = read_reflectance(&path.with_file_name(&*file))?;
+    }
     check_rig(&rig).map_err(|wrong| {
         FileError::new(path, wrong.problem, wrong.remedy).at(format_args!("key {}", wrong.key))
     })?;
@@ -54,6 +58,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         camera,
         target,
         reference,
+        sensor,
         sampling,
     } = rig;
     within("light.distance_m", light.distance_m, 0.01..=1000.0, "m")?;
@@ -110,10 +115,14 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         });
     }
 
-    if let Some(reference) = reference {
-        for rho in reference.reflectance {
+    if let Some(Reference::Reflectance(reflectance)) = reference {
+        for rho in *reflectance {
             within("reference.reflectance", rho, f64::MIN_POSITIVE..=1.0, "")?;
         }
+    }
+
+    if let Some(sensor) = sensor {
+        check_sensor(sensor)?;
     }
 
     within(
@@ -160,6 +169,45 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     Ok(())
 }
 
+fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
+    let counts = f64::from(u16::MAX);
+    within(
+        "sensor.black_counts",
+        sensor.black_counts,
+        0.0..=counts,
+        "counts",
+    )?;
+    within(
+        "sensor.saturation_counts",
+        sensor.saturation_counts,
+        f64::MIN_POSITIVE..=counts,
+        "counts",
+    )?;
+    within(
+        "sensor.gain_e_per_count",
+        sensor.gain_e_per_count,
+        1e-6..=1e6,
+        "electrons a count",
+    )?;
+    within(
+        "sensor.read_noise_e",
+        sensor.read_noise_e,
+        0.0..=1e6,
+        "electrons",
+    )?;
+    if sensor.black_counts < sensor.saturation_counts {
+        return Ok(());
+    }
+    Err(RigError {
+        key: "sensor.saturation_counts",
+        problem: format!(
+            "saturation ({} counts) does not lie above black ({} counts)",
+            sensor.saturation_counts, sensor.black_counts
+        ),
+        remedy: "give the counts of a frame without light, and those the sensor ends at".into(),
+    })
+}
+
 fn within(
     key: &'static str,
     value: f64,
@@ -190,7 +238,7 @@ fn within(
 
 #[cfg(test)]
 mod tests {
-    use super::super::rig::Reference;
+    use super::super::rig::{Bayer, ReflectanceTable};
     use super::*;
 
     fn read_text(text: &str) -> Result<Rig, FileError> {
@@ -210,11 +258,41 @@ mod tests {
         let path = dir.path().join("rig.toml");
         let mut rig = Rig::paper(400);
         rig.camera.k1 = -0.02;
-        rig.reference = Some(Reference {
-            reflectance: [0.99, 0.98, 1.0],
+        rig.reference = Some(Reference::Reflectance([0.99, 0.98, 1.0]));
+        rig.sensor = Some(Sensor {
+            black_counts: 64.0,
+            saturation_counts: 4000.0,
+            gain_e_per_count: 2.5,
+            read_noise_e: 4.0,
+            bayer: Some(Bayer::Grbg),
         });
         write_rig(&path, &rig).unwrap();
         assert_eq!(read_rig(&path).unwrap(), rig);
+    }
+
+    #[test]
+    fn a_reference_has_a_reflectance_or_a_table_beside_the_rig() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rig.toml");
+        let read = |keys: &str| {
+            std::fs::write(&path, format!("{}\n[reference]\n{keys}\n", paper_text())).unwrap();
+            read_rig(&path)
+        };
+        let error = read("table = \"white.csv\"").unwrap_err().to_string();
+        assert!(error.contains("white.csv: cannot be read"), "{error}");
+        std::fs::write(dir.path().join("white.csv"), "theta_i,r,g,b\n8,1,0.9,1\n").unwrap();
+        let rig = read("table = \"white.csv\"").unwrap();
+        let expected = Reference::Table {
+            file: "white.csv".into(),
+            table: ReflectanceTable::ByIncidence(vec![(8.0, [1.0, 0.9, 1.0])]),
+        };
+        assert_eq!(rig.reference, Some(expected));
+        write_rig(&path, &rig).unwrap();
+        assert_eq!(read_rig(&path).unwrap(), rig);
+        for keys in ["", "table = \"white.csv\"\nreflectance = [1.0, 1.0, 1.0]"] {
+            let error = read(keys).unwrap_err().to_string();
+            assert!(error.contains("either reflectance or table"), "{error}");
+        }
     }
 
     #[test]
@@ -267,6 +345,11 @@ mod tests {
                 "distance_m = 1.1",
                 "distance_m = 0.2",
                 "sampling.disc_radius_mm",
+            ),
+            (
+                "[sampling]",
+                "[sensor]\nblack_counts = 4095\nsaturation_counts = 64\ngain_e_per_count = 2\nread_noise_e = 3\n[sampling]",
+                "sensor.saturation_counts",
             ),
         ] {
             let text = paper_text();

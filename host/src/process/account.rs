@@ -68,6 +68,8 @@ pub struct LeftOutCounts {
     pub mark: u64,
     /// The patch, or the reference's, held a pixel that was not a number.
     pub not_finite: u64,
+    /// The patch, or the reference's, held a saturated pixel.
+    pub saturated: u64,
     /// The patch reached beyond the frame.
     pub border: u64,
     /// The reference was not brighter than black there.
@@ -83,6 +85,7 @@ impl LeftOutCounts {
             LeftOut::Occlusion => self.occlusion += 1,
             LeftOut::Mark => self.mark += 1,
             LeftOut::NotFinite => self.not_finite += 1,
+            LeftOut::Saturated => self.saturated += 1,
             LeftOut::Border => self.border += 1,
         }
     }
@@ -92,6 +95,7 @@ impl LeftOutCounts {
         self.occlusion
             + self.mark
             + self.not_finite
+            + self.saturated
             + self.border
             + self.dark_reference
             + self.below_horizon
@@ -103,6 +107,7 @@ impl AddAssign for LeftOutCounts {
         self.occlusion += other.occlusion;
         self.mark += other.mark;
         self.not_finite += other.not_finite;
+        self.saturated += other.saturated;
         self.border += other.border;
         self.dark_reference += other.dark_reference;
         self.below_horizon += other.below_horizon;

@@ -8,16 +8,18 @@ use super::ReferenceSummary;
 use super::account::LeftOutCounts;
 use super::central::{CentralField, fit_central};
 use super::coverage::{CoverageError, check_central, check_matches};
+use super::masks::Masks;
 use super::reference::{ReferenceFrame, References};
+use super::reflectance::KnownReference;
 use super::source::FrameRow;
 use crate::dataset::Rig;
+use crate::vision::Mask;
 use gonia_brdf::{Pose, Vec3};
-use std::f64::consts::PI;
 
 /// How light and beam were compensated for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compensation {
-    /// By a Lambertian reference of known albedo: f = (I/I_R)·ρ/π, in 1/sr.
+    /// By a reference of known reflectance: f = (I/I_R)·ρ/π, in 1/sr.
     KnownReference,
     /// By an unknown reference measured over the whole plan: eq. (3), relative to the irradiance
     /// at the target's centre at normal incidence.
@@ -42,7 +44,7 @@ pub struct Compensator {
 }
 
 enum Method {
-    Known { albedo_over_pi: [f32; 3] },
+    Known(KnownReference),
     Unknown(Box<CentralField>),
     Geometric,
 }
@@ -59,9 +61,7 @@ impl Compensator {
         let mut central = 0;
         let method = match &rig.reference {
             _ if references.frames().is_empty() => Method::Geometric,
-            Some(reference) => Method::Known {
-                albedo_over_pi: reference.reflectance.map(|rho| (rho / PI) as f32),
-            },
+            Some(reference) => Method::Known(KnownReference::new(reference)),
             None => {
                 let matched: Vec<_> = material
                     .iter()
@@ -86,7 +86,7 @@ impl Compensator {
     /// Which method it is.
     pub fn kind(&self) -> Compensation {
         match self.method {
-            Method::Known { .. } => Compensation::KnownReference,
+            Method::Known(_) => Compensation::KnownReference,
             Method::Unknown(_) => Compensation::UnknownReference,
             Method::Geometric => Compensation::GeometricModel,
         }
@@ -107,10 +107,19 @@ impl Compensator {
         let frames = self.references.frames();
         ReferenceSummary {
             frames: frames.len(),
-            occluded: frames.iter().filter(|f| f.mask_bytes > 0).count(),
-            mask_bytes: frames.iter().map(|f| f.mask_bytes).sum(),
+            occluded: frames.iter().filter(|f| f.mask.is_some()).count(),
+            mask_bytes: frames
+                .iter()
+                .filter_map(|f| f.mask.as_ref())
+                .map(Mask::bytes)
+                .sum(),
             central: self.central,
         }
+    }
+
+    /// What hid the target in the reference's frames.
+    pub fn into_masks(self) -> Masks {
+        Masks::new(self.references.into_masks())
     }
 
     /// The BRDF at a grid point from its radiance over the ideal irradiance; `None`, and counted,
@@ -125,7 +134,7 @@ impl Compensator {
     ) -> Option<[f32; 3]> {
         let factor = match &self.method {
             Method::Geometric => return Some(relative),
-            Method::Known { albedo_over_pi } => *albedo_over_pi,
+            Method::Known(reference) => reference.at(light, view),
             Method::Unknown(field) => field.at(light, view),
         };
         let beneath = reference?.at(point, counts)?;

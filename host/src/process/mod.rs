@@ -7,13 +7,16 @@ pub mod account;
 pub mod central;
 mod compensation;
 pub mod coverage;
+pub mod masks;
 mod reference;
+mod reflectance;
 pub mod source;
 #[cfg(test)]
 mod tests;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
 pub use compensation::Compensation;
+pub use masks::Masks;
 pub use source::{FrameRow, FrameSource, Role};
 
 use crate::dataset::{FileError, Frame, Rig};
@@ -51,6 +54,8 @@ pub struct Processed {
     pub offsets: OffsetStatistics,
     /// The reference.
     pub reference: ReferenceSummary,
+    /// What hid the target in the reference's frames.
+    pub masks: Masks,
 }
 
 /// What the reference's frames gave.
@@ -125,6 +130,17 @@ pub fn process(
     source: &dyn FrameSource,
     progress: &(dyn Fn(Stage, usize, usize) + Sync),
 ) -> Result<Processed, ProcessError> {
+    process_with_masks(rig, source, &Masks::default(), progress)
+}
+
+/// As [`process`], with the masks of another session's reference for the poses at which this one has
+/// no reference frame; where those have none either, the material's own frame must tell.
+pub fn process_with_masks(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    masks: &Masks,
+    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+) -> Result<Processed, ProcessError> {
     let of_role =
         |role| -> Vec<&FrameRow> { source.rows().iter().filter(|r| r.role == role).collect() };
     let (material, reference) = (of_role(Role::Material), of_role(Role::Reference));
@@ -133,7 +149,7 @@ pub fn process(
             rows: source.rows().len(),
         });
     }
-    let bench = Bench::new(rig, source);
+    let bench = Bench::new(rig, source, masks);
     let mut frames = Vec::with_capacity(source.rows().len());
     let mut references = Vec::new();
     bench.each(
@@ -176,6 +192,7 @@ pub fn process(
         frames,
         left_out,
         reference: compensator.summary(),
+        masks: compensator.into_masks(),
     })
 }
 
@@ -183,15 +200,17 @@ pub fn process(
 struct Bench<'a> {
     rig: &'a Rig,
     source: &'a dyn FrameSource,
+    masks: &'a Masks,
     registrar: Registrar,
     grid: SamplingGrid,
 }
 
 impl<'a> Bench<'a> {
-    fn new(rig: &'a Rig, source: &'a dyn FrameSource) -> Self {
+    fn new(rig: &'a Rig, source: &'a dyn FrameSource, masks: &'a Masks) -> Self {
         Self {
             rig,
             source,
+            masks,
             registrar: Registrar::new(rig),
             grid: SamplingGrid::new(rig),
         }
@@ -262,7 +281,7 @@ impl<'a> Bench<'a> {
             pose,
             &points,
             |i, value| light.irradiance(self.place(i, value)),
-            mask.map_or(0, |m| m.bytes()),
+            mask,
         );
         Ok((report, Some(reference)))
     }
@@ -284,12 +303,18 @@ impl<'a> Bench<'a> {
             report.outcome = Outcome::Refused(Refusal::NoReference);
             return Ok((report, Vec::new(), counts));
         }
-        // Without a reference the material's own frame must tell what hides it.
+        // What hid the reference hid the material, and those points are left out already. Without
+        // both, the material's own frame must tell.
+        let known = self.masks.at(row.pose);
+        let own = match (reference, known) {
+            (None, None) => find_occlusion(&frame, &registration, row.pose.light, self.rig),
+            _ => None,
+        };
         let mask = match reference {
             Some(_) => None,
-            None => find_occlusion(&frame, &registration, row.pose.light, self.rig),
+            None => own.as_ref().or(known.flatten()),
         };
-        let points = self.grid.sample(&frame, &registration, mask.as_ref());
+        let points = self.grid.sample(&frame, &registration, mask);
         let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
         let mut samples = Vec::with_capacity(points.len());
         for (i, point) in points.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! What the frames of the reference tell: its radiance at every grid point of every pose.
 
 use super::account::LeftOutCounts;
-use crate::vision::{LeftOut, PointValue};
+use crate::vision::{LeftOut, Mask, PointValue};
 use gonia_brdf::direction::{angle_between, wrap_deg};
 use gonia_brdf::{Direction, Pose};
 
@@ -23,8 +23,8 @@ pub struct ReferenceFrame {
     pub relative: Box<[[f32; 3]]>,
     /// Why a point has no value.
     pub missing: Box<[Option<LeftOut>]>,
-    /// Bytes of the occlusion mask; 0 when nothing hid the target.
-    pub mask_bytes: usize,
+    /// What hid the target.
+    pub mask: Option<Mask>,
 }
 
 impl ReferenceFrame {
@@ -34,7 +34,7 @@ impl ReferenceFrame {
         pose: Pose,
         points: &[Result<PointValue, LeftOut>],
         irradiance: impl Fn(usize, &PointValue) -> f64,
-        mask_bytes: usize,
+        mask: Option<Mask>,
     ) -> Self {
         let relative = |(i, point): (usize, &Result<PointValue, LeftOut>)| match point {
             Ok(value) => {
@@ -48,7 +48,7 @@ impl ReferenceFrame {
             pose,
             relative: points.iter().enumerate().map(relative).collect(),
             missing: points.iter().map(|p| p.err()).collect(),
-            mask_bytes,
+            mask,
         }
     }
 
@@ -83,6 +83,12 @@ impl References {
     /// All of them.
     pub fn frames(&self) -> &[ReferenceFrame] {
         &self.frames
+    }
+
+    /// What hid the target in each of them, by the arms' reading.
+    pub fn into_masks(self) -> Vec<(Pose, Option<Mask>)> {
+        let masks = self.frames.into_iter();
+        masks.map(|frame| (frame.reading, frame.mask)).collect()
     }
 
     /// The reference frame taken at a pose (by the arms' reading): the nearest within 0.1°.

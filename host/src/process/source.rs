@@ -1,6 +1,7 @@
 //! Where frames come from.
 
 use crate::dataset::{CaptureFolder, FileError, Frame};
+use crate::hdr::load_bracket;
 
 pub use crate::dataset::{FrameRow, Role};
 
@@ -19,6 +20,10 @@ impl FrameSource for CaptureFolder {
     }
 
     fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
-        self.load(row)
+        if self.exposures(row).is_empty() {
+            self.load(row)
+        } else {
+            load_bracket(self, row).map(|radiance| radiance.frame)
+        }
     }
 }

@@ -155,9 +155,7 @@ fn lambertian(px: usize) -> (Rendered, Rig) {
     let mut scene = scene(px);
     scene.reference = Arc::new(Kurt::new(ALBEDO, &[]));
     let mut rig = rig(&scene.geometry);
-    rig.reference = Some(Reference {
-        reflectance: ALBEDO,
-    });
+    rig.reference = Some(Reference::Reflectance(ALBEDO));
     let mut source = Rendered::new(scene);
     for angles in POSES {
         source.add(Role::Reference, angles);
@@ -338,4 +336,73 @@ fn samples_do_not_depend_on_the_number_of_threads_and_progress_counts_to_the_end
         done.samples
     };
     assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn masks_of_a_references_frames_serve_a_material_without_them() {
+    let mut scene = scene(400);
+    scene.beam = None;
+    let rig = rig(&scene.geometry);
+    // The head in front of the material, and a material too dark to tell by itself what hides it.
+    let hidden = [30.0, 60.0, 30.0, 60.0];
+    let mut with_reference = Rendered::new(scene.clone());
+    with_reference.add(Role::Reference, hidden);
+    with_reference.add(Role::Material, hidden);
+    let mut known = rig.clone();
+    known.reference = Some(Reference::Reflectance([0.5; 3]));
+    let first = process(&known, &with_reference, &|_, _, _| ()).unwrap();
+    assert_eq!(first.masks.len(), 1);
+    let occluded = first.left_out.occlusion;
+    assert!(occluded > 50, "{occluded}");
+
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("masks.csv");
+    first.masks.write(&path, &rig).unwrap();
+    let masks = Masks::read(&path, &rig).unwrap();
+    scene.material = Arc::new(Kurt::new([0.02; 3], &[]));
+    let mut alone = Rendered::new(scene);
+    alone.add(Role::Material, hidden);
+    alone.rows[0].frame = 1;
+    let done = process_with_masks(&rig, &alone, &masks, &|_, _, _| ()).unwrap();
+    let off = done.left_out.occlusion.abs_diff(occluded);
+    assert!(off <= 5, "{occluded}, and {}", done.left_out.occlusion);
+    let without = process(&rig, &alone, &|_, _, _| ()).unwrap();
+    assert_eq!(without.left_out.occlusion, 0);
+}
+
+#[test]
+fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
+    use crate::dataset::rig::ReflectanceTable;
+    let (source, mut rig) = lambertian(400);
+    // The truth is Lambertian: a table of twice the albedo at 60° gives twice the value there.
+    let rows = vec![
+        (0.0, ALBEDO),
+        (40.0, ALBEDO),
+        (58.0, ALBEDO.map(|a| 2.0 * a)),
+    ];
+    rig.reference = Some(Reference::Table {
+        file: "white.csv".into(),
+        table: ReflectanceTable::ByIncidence(rows),
+    });
+    let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+    assert_eq!(done.compensation, Compensation::KnownReference);
+    for (theta, factor) in [(30.0f32, 1.0f64), (75.0, 2.0)] {
+        let truth = source.scene.material.as_ref();
+        let near = |s: &&Sample| (s.theta_i_deg - theta).abs() < 2.0;
+        let logs: Vec<f64> = done
+            .samples
+            .iter()
+            .filter(near)
+            .map(|s| {
+                let at = |t: f32, p: f32| Direction::from_deg(t.into(), p.into()).to_vec3();
+                let f = truth.eval(
+                    at(s.theta_i_deg, s.phi_i_deg),
+                    at(s.theta_v_deg, s.phi_v_deg),
+                );
+                (f64::from(s.rgb[1]) / f[1] / factor).ln()
+            })
+            .collect();
+        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+        assert!(logs.len() > 100 && mean.abs() < 0.002, "{theta}: {mean}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Hough transform of one strip: where the bright line is, to about a pixel.
 
 use super::lines::LineStrip;
+use crate::dataset::Frame;
 
 /// A line in a strip: t = offset + slope·s, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,28 +21,38 @@ impl StripLine {
 
 /// Finds the strongest bright line within `search_px` of the prediction. Every Sobel edge votes,
 /// with its sign, for the lines through it; a bright line is where a rise is followed, one line's
-/// width further out, by a fall. Each station has the same say, however brightly it is lit.
-pub fn strongest_line(strip: &LineStrip, half_width_mm: f64, search_px: f64) -> Option<StripLine> {
+/// width further out, by a fall. `resolution` is the size of a bin in half widths of the line (of at
+/// least two pixels). Each station has the same say, however brightly it is lit.
+pub fn strongest_line(
+    frame: &Frame,
+    strip: &LineStrip,
+    half_width_mm: f64,
+    search_px: f64,
+    resolution: f64,
+) -> Option<StripLine> {
     if strip.stations.is_empty() {
         return None;
     }
     // Sobel's own width keeps the two edges of a hair line about a pixel either side of it.
     let half_width = (half_width_mm * strip.px_per_mm()).max(1.0);
-    let bin = (0.5 * half_width).max(1.0);
+    let bin = resolution * half_width.max(2.0);
     let reach = search_px + half_width;
     let bins = (2.0 * reach / bin).ceil() as usize + 1;
     let max_slope = 0.5 * search_px;
     let slopes = 2 * (max_slope / bin).ceil() as usize + 1;
     let slope_at = |i: usize| (i as f64 - (slopes / 2) as f64) * bin;
     let mut votes = vec![0.0f32; slopes * bins];
+    let mut gradients = Vec::new();
     for station in &strip.stations {
         let run = &strip.samples[station.run.clone()];
-        let strongest = run.iter().map(|p| p.gradient.abs()).fold(0.0, f32::max);
+        gradients.clear();
+        gradients.extend(run.iter().map(|sample| strip.gradient(frame, sample)));
+        let strongest = gradients.iter().map(|g| g.abs()).fold(0.0, f32::max);
         if strongest <= 0.0 {
             continue;
         }
-        for sample in run {
-            let weight = sample.gradient / strongest;
+        for (sample, gradient) in run.iter().zip(&gradients) {
+            let weight = gradient / strongest;
             if weight.abs() < 0.1 {
                 continue;
             }

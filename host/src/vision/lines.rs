@@ -22,8 +22,8 @@ pub const SIDES: [Side; 4] = [
 
 /// More stations on a line than this cost time and bring little.
 const MAX_STATIONS: f64 = 256.0;
-/// Pixels kept beyond the search range, for the fit's own window.
-const WINDOW_PX: f64 = 6.0;
+/// Pixels kept beyond the search range and the line itself, for the fit's own window.
+const WINDOW_PX: f64 = 4.0;
 /// Distance from the ends of a line (the crossings) at which stations begin, pixels.
 const CLEAR_OF_CROSSING_PX: f64 = 4.0;
 
@@ -74,8 +74,8 @@ pub struct RunSample {
     pub t: f32,
     /// Luminance; NaN where the frame has none.
     pub value: f32,
-    /// Sobel gradient outwards; 0 at the border.
-    pub gradient: f32,
+    /// Its place in the frame.
+    pub pixel: [u16; 2],
 }
 
 impl LineStrip {
@@ -121,7 +121,10 @@ impl LineStrip {
                 let d = target_to_px.jacobian(mm)[side.axis];
                 (d[0] * outward[0] + d[1] * outward[1]).abs()
             };
-            strip.fill(frame, camera, search_px, reach, across);
+            // Perspective makes the near end of a line up to half as wide again as its middle.
+            let half_line = 0.75 * target.line_width_mm * step[0].hypot(step[1]);
+            let reach_px = search_px + half_line + WINDOW_PX;
+            strip.fill(frame, camera, reach_px, reach, across);
         }
         strip
     }
@@ -130,14 +133,14 @@ impl LineStrip {
         &mut self,
         frame: &Frame,
         camera: &CameraModel,
-        search_px: f64,
+        reach_px: f64,
         reach: f64,
         px_per_mm: impl Fn([f64; 2]) -> f64,
     ) {
         // Runs go down the columns under a flat line and along the rows beside a steep one.
         let main = usize::from(self.along[0].abs() < self.along[1].abs());
         let cross = 1 - main;
-        let half = ((search_px + WINDOW_PX) / self.outward[cross].abs()).ceil() as i64;
+        let half = (reach_px / self.outward[cross].abs()).ceil() as i64;
         let extent = self.length * self.along[main].abs() * reach;
         let count = extent.min(MAX_STATIONS).floor() as usize;
         let size = [frame.width as i64, frame.height as i64];
@@ -154,12 +157,11 @@ impl LineStrip {
                 pixel[cross] = k;
                 let [column, row] = pixel.map(|c| c as usize);
                 let (s, t) = self.place(camera.undistort(pixel.map(|c| c as f64 + 0.5)));
-                let g = sobel(frame, column, row);
                 self.samples.push(RunSample {
                     s: s as f32,
                     t: t as f32,
                     value: luminance(frame.rgb[row * frame.width + column]),
-                    gradient: g[0] * self.outward[0] as f32 + g[1] * self.outward[1] as f32,
+                    pixel: [column as u16, row as u16],
                 });
             }
             if self.samples.len() > start {
@@ -183,6 +185,13 @@ impl LineStrip {
         let d = [ideal[0] - self.from[0], ideal[1] - self.from[1]];
         let dot = |axis: [f64; 2]| d[0] * axis[0] + d[1] * axis[1];
         (2.0 * dot(self.along) / self.length - 1.0, dot(self.outward))
+    }
+
+    /// Sobel gradient outwards of a sample's pixel; 0 at the border.
+    pub fn gradient(&self, frame: &Frame, sample: &RunSample) -> f32 {
+        let [column, row] = sample.pixel.map(usize::from);
+        let g = sobel(frame, column, row);
+        g[0] * self.outward[0] as f32 + g[1] * self.outward[1] as f32
     }
 
     /// Mean number of pixels outwards a millimetre.

@@ -7,7 +7,10 @@ mod hough;
 pub mod ideal_light;
 mod lines;
 pub mod occlusion;
+mod patch;
 mod profile;
+mod quantiles;
+pub mod rectify;
 mod refine;
 pub mod register;
 #[cfg(test)]
@@ -20,6 +23,7 @@ pub(crate) mod simulated;
 
 pub use camera::CameraModel;
 pub use homography::Homography;
+pub use ideal_light::IdealLight;
 pub use occlusion::Mask;
 pub use register::{PoseOffset, Reason, Registrar, Registration, State};
 pub use sampling::{LeftOut, PointValue, SamplingGrid};

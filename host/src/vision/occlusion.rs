@@ -32,6 +32,51 @@ impl Mask {
         self.words[bit / 64] >> (bit % 64) & 1 == 1
     }
 
+    /// Whether one of a row's pixels is hidden.
+    pub fn hides_any(&self, columns: &std::ops::Range<usize>, row: usize) -> bool {
+        let y = (row / self.cell).wrapping_sub(self.top);
+        if y >= self.height || columns.is_empty() {
+            return false;
+        }
+        let first = (columns.start / self.cell).max(self.left);
+        let last = ((columns.end - 1) / self.cell).min(self.left + self.width - 1);
+        (first..=last).any(|x| {
+            let bit = y * self.width + x - self.left;
+            self.words[bit / 64] >> (bit % 64) & 1 == 1
+        })
+    }
+
+    /// The mask as bytes, for a file: cell, left, top, width, height, and the bitmap's words.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let numbers = [self.cell, self.left, self.top, self.width, self.height];
+        let head = numbers.iter().flat_map(|n| (*n as u32).to_le_bytes());
+        head.chain(self.words.iter().flat_map(|w| w.to_le_bytes()))
+            .collect()
+    }
+
+    /// The mask of [`Self::to_bytes`]; `None` when the bytes are no mask.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let (head, words) = bytes.split_at_checked(20)?;
+        let mut numbers = [0; 5];
+        for (number, bytes) in numbers.iter_mut().zip(head.as_chunks::<4>().0) {
+            *number = u32::from_le_bytes(*bytes) as usize;
+        }
+        let [cell, left, top, width, height] = numbers;
+        let (words, rest) = words.as_chunks::<8>();
+        let whole = cell > 0
+            && width.checked_mul(height)? > 0
+            && rest.is_empty()
+            && words.len() == (width * height).div_ceil(64);
+        whole.then(|| Self {
+            cell,
+            left,
+            top,
+            width,
+            height,
+            words: words.iter().map(|w| u64::from_le_bytes(*w)).collect(),
+        })
+    }
+
     /// Number of hidden cells.
     pub fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
@@ -316,6 +361,32 @@ mod tests {
         let corner = Mask::grown(&[[0, 19]], 2, [20, 20], 1).unwrap();
         assert!(corner.hides(0, 19) && corner.hides(2, 17) && !corner.hides(0, 16));
         assert!(Mask::grown(&[], 2, [20, 20], 1).is_none());
+    }
+
+    #[test]
+    fn a_mask_comes_back_from_its_bytes_and_from_no_others() {
+        let mask = Mask::grown(&[[5, 5], [90, 40]], 2, [200, 100], 3).unwrap();
+        let bytes = mask.to_bytes();
+        assert_eq!(Mask::from_bytes(&bytes), Some(mask));
+        for n in 0..bytes.len() {
+            assert_eq!(Mask::from_bytes(&bytes[..n]), None);
+        }
+        assert_eq!(Mask::from_bytes(&[0; 28]), None);
+    }
+
+    #[test]
+    fn a_row_is_hidden_where_one_of_its_pixels_is() {
+        let mask = Mask::grown(&[[5, 5], [12, 9]], 1, [20, 20], 2).unwrap();
+        for row in 0..40 {
+            for (first, end) in [(0, 7), (3, 9), (8, 20), (14, 21), (22, 40), (30, 30)] {
+                let any = (first..end).any(|column| mask.hides(column, row));
+                assert_eq!(
+                    mask.hides_any(&(first..end), row),
+                    any,
+                    "{row} {first} {end}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -214,7 +214,7 @@ mod tests {
                     s: 0.0,
                     t: t as f32,
                     value: value as f32,
-                    gradient: 0.0,
+                    pixel: [0; 2],
                 }
             })
             .collect()

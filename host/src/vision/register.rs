@@ -27,6 +27,9 @@ const MODEL_PX_PER_1000: f64 = 0.05;
 const MODEL_PX: f64 = 0.02;
 /// Floor of a line's own standard error, pixels.
 const LINE_FLOOR_PX: f64 = 0.003;
+/// With less than a pixel of desk between line and material each can stand in for the other: this
+/// many pixels, times 1/gap⁴ − 1, come on top.
+const CROWDED_PX: f64 = 0.04;
 /// Lines that the moved camera misses by more than this share of the width are not the target's.
 const MISFIT_WIDTHS: f64 = 6e-4;
 /// Nothing is believed of a frame in which fewer lines are seen.
@@ -40,8 +43,12 @@ const MAX_DEVIATION: f64 = 6.0;
 const LOOSE_ARM_DEG: f64 = 0.5;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
+/// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
+const HOUGH_RESOLUTION: f64 = 0.5;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
 const SEARCH_WIDTHS: f64 = 0.02;
+/// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
+const NEAR_WIDTHS: f64 = 1e-3;
 /// A line further than this from its prediction is measured again from a better one.
 const RELINEARIZE_PX: f64 = 1.5;
 
@@ -50,6 +57,7 @@ const RELINEARIZE_PX: f64 = 1.5;
 pub struct Registrar {
     camera: CameraModel,
     target: Target,
+    hough_resolution: f64,
 }
 
 /// Where the target is in one frame.
@@ -135,7 +143,15 @@ impl Registrar {
         Self {
             camera: CameraModel::new(&rig.camera),
             target: rig.target.clone(),
+            hough_resolution: HOUGH_RESOLUTION,
         }
+    }
+
+    /// With another size of Hough's bins, in half widths of a line; 0.5 is the default.
+    #[must_use]
+    pub fn with_hough_resolution(mut self, half_widths: f64) -> Self {
+        self.hough_resolution = half_widths;
+        self
     }
 
     /// Registers a frame taken at the given reading of the arms. Never fails: without marks it
@@ -184,17 +200,8 @@ impl Registrar {
         view: Direction,
         predicted: &Homography,
     ) -> Result<Solution, Failure> {
-        let search_px = SEARCH_WIDTHS * frame.width as f64 + 4.0;
-        let strips = SIDES.map(|side| {
-            LineStrip::cut(
-                frame,
-                &self.camera,
-                predicted,
-                &self.target,
-                side,
-                search_px,
-            )
-        });
+        let width = frame.width as f64;
+        let strips = self.strips(frame, predicted, NEAR_WIDTHS * width + 4.0);
         let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
         if fit.lines.iter().all(Option::is_some) {
             let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
@@ -203,11 +210,34 @@ impl Registrar {
                 return self.settle(view, &strips, fit, estimate);
             }
         }
+        let search_px = SEARCH_WIDTHS * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
         let half_width = 0.5 * self.target.line_width_mm;
-        let hough = [0, 1, 2, 3].map(|i| strongest_line(&strips[i], half_width, search_px));
+        let hough = strips.each_ref().map(|strip| {
+            strongest_line(frame, strip, half_width, search_px, self.hough_resolution)
+        });
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the marks beside them.
-            self.search(view, &strips, [None; 4]).map_err(|_| failure)
+            let again = self.search(view, &strips, [None; 4]);
+            again.map_err(|second| match second.reason {
+                // Hidden lines, and others where the pose has them: that says more.
+                Reason::LinesMissing { found } if found > 0 => second,
+                _ => failure,
+            })
+        })
+    }
+
+    /// The neighbourhoods of the four lines, `search_px` to either side.
+    fn strips(&self, frame: &Frame, predicted: &Homography, search_px: f64) -> [LineStrip; 4] {
+        SIDES.map(|side| {
+            LineStrip::cut(
+                frame,
+                &self.camera,
+                predicted,
+                &self.target,
+                side,
+                search_px,
+            )
         })
     }
 
@@ -221,6 +251,11 @@ impl Registrar {
         let fit = fit_lines(strips, &Starts::Around(hough), &self.target);
         let found = fit.lines.iter().flatten().count();
         if found < MIN_LINES {
+            // Even those few must be where the pose has them, or they are something else.
+            let estimate = self.estimate(view, strips, &fit.lines, &self.trust(ARM_DEG));
+            if found > 0 && estimate.surprise > MAX_SURPRISE {
+                return Err(Failure::new(estimate.wrong_layout(), &fit));
+            }
             return Err(Failure::new(Reason::LinesMissing { found }, &fit));
         }
         let estimate = self.best_estimate(view, strips, &fit.lines);
@@ -330,7 +365,7 @@ impl Registrar {
                 for c in 0..2 {
                     covariance[(2 * row + r, 2 * row + c)] += own[r][c];
                 }
-                covariance[(2 * row + r, 2 * row + r)] += LINE_FLOOR_PX * LINE_FLOOR_PX;
+                covariance[(2 * row + r, 2 * row + r)] += self.line_variance(&strips[pair[0] / 2]);
             }
         }
         let failed = Estimate {
@@ -382,6 +417,16 @@ impl Registrar {
             misfit_px: residual.norm() / (n as f64).sqrt(),
             camera_deviation: p.rows(2, 4).amax(),
         }
+    }
+
+    /// What a line's place is trusted to at best, px².
+    fn line_variance(&self, strip: &LineStrip) -> f64 {
+        let gap_mm = self.target.line_offset_mm
+            - self.target.material_half_mm
+            - 0.5 * self.target.line_width_mm;
+        let gap_px = (gap_mm * strip.px_per_mm()).max(1e-3);
+        let crowded = CROWDED_PX * (gap_px.powi(-4) - 1.0).max(0.0);
+        LINE_FLOOR_PX.powi(2) + crowded * crowded
     }
 
     fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {

@@ -1,6 +1,8 @@
 //! The values at the grid points of a frame: medians over the pixels of projected patches.
 
 use super::occlusion::Mask;
+use super::patch::Patch;
+use super::quantiles::{Workspace, median_and_spread};
 use super::register::Registration;
 use crate::dataset::{Frame, Rig};
 
@@ -35,6 +37,8 @@ pub enum LeftOut {
     Mark,
     /// Its patch holds a pixel that is not a number.
     NotFinite,
+    /// Its patch holds a pixel that was too bright for the sensor (+∞).
+    Saturated,
     /// Its patch reaches beyond the frame.
     Border,
 }
@@ -89,7 +93,8 @@ impl SamplingGrid {
             mask,
             patch_half: 0.5 * self.patch_mm,
             limit: self.material_half_mm,
-            channels: [Vec::new(), Vec::new(), Vec::new()],
+            patch: Patch::default(),
+            room: Workspace::default(),
         };
         self.points_mm.iter().map(|p| sampler.point(*p)).collect()
     }
@@ -101,7 +106,8 @@ struct Sampler<'a> {
     mask: Option<&'a Mask>,
     patch_half: f64,
     limit: f64,
-    channels: [Vec<f32>; 3],
+    patch: Patch,
+    room: Workspace,
 }
 
 impl Sampler<'_> {
@@ -118,18 +124,23 @@ impl Sampler<'_> {
         if !corners.iter().all(inside) {
             return Err(LeftOut::Border);
         }
-        for channel in &mut self.channels {
-            channel.clear();
-        }
+        self.patch.clear();
         let mut sum = [0.0; 2];
         for (row, columns) in Rows::of(&corners) {
-            for column in columns {
-                self.take(column, row)?;
-                sum[0] += column as f64 + 0.5;
-                sum[1] += row as f64 + 0.5;
+            if self.mask.is_some_and(|mask| mask.hides_any(&columns, row)) {
+                return Err(LeftOut::Occlusion);
             }
+            let n = columns.len() as f64;
+            sum[0] += n * 0.5 * (columns.start + columns.end) as f64;
+            sum[1] += n * (row as f64 + 0.5);
+            let start = row * self.frame.width;
+            self.patch
+                .extend(&self.frame.rgb[start + columns.start..start + columns.end]);
         }
-        let pixels = self.channels[0].len();
+        if !self.patch.is_finite() {
+            return Err(reason_of(self.patch.values()));
+        }
+        let pixels = self.patch.len();
         if pixels < FEWEST_PIXELS {
             return self.interpolated(at);
         }
@@ -138,27 +149,10 @@ impl Sampler<'_> {
         Ok(self.value(seen, pixels as u32))
     }
 
-    /// Adds a pixel to the patch.
-    fn take(&mut self, column: usize, row: usize) -> Result<(), LeftOut> {
-        if self.mask.is_some_and(|mask| mask.hides(column, row)) {
-            return Err(LeftOut::Occlusion);
-        }
-        let rgb = self.frame.rgb[row * self.frame.width + column];
-        if !rgb.iter().all(|v| v.is_finite()) {
-            return Err(LeftOut::NotFinite);
-        }
-        for (channel, value) in self.channels.iter_mut().zip(rgb) {
-            channel.push(value);
-        }
-        Ok(())
-    }
-
     /// Median over points spread evenly over a patch of hardly any pixels, each bilinear between
     /// its four pixels: centred on the grid point, so that no offset is left.
     fn interpolated(&mut self, at: [f64; 2]) -> Result<PointValue, LeftOut> {
-        for channel in &mut self.channels {
-            channel.clear();
-        }
+        self.patch.clear();
         let place = |i: usize| self.patch_half * ((2 * i + 1) as f64 / POINTS_A_SIDE as f64 - 1.0);
         let size = [self.frame.width, self.frame.height];
         for k in 0..POINTS_A_SIDE * POINTS_A_SIDE {
@@ -172,7 +166,7 @@ impl Sampler<'_> {
             }
             let (column, row) = (p[0] as usize, p[1] as usize);
             let f = [p[0].fract() as f32, p[1].fract() as f32];
-            let mut value = [0.0f32; 3];
+            let (mut value, mut worst) = ([0.0f32; 3], [0.0f32; 3]);
             for (dc, wc) in [(0, 1.0 - f[0]), (1, f[0])] {
                 for (dr, wr) in [(0, 1.0 - f[1]), (1, f[1])] {
                     let (column, row) = (column + dc, row + dr);
@@ -180,17 +174,16 @@ impl Sampler<'_> {
                         return Err(LeftOut::Occlusion);
                     }
                     let rgb = self.frame.rgb[row * self.frame.width + column];
-                    for (sum, v) in value.iter_mut().zip(rgb) {
-                        *sum += wc * wr * v;
+                    for c in 0..3 {
+                        value[c] += wc * wr * rgb[c];
+                        worst[c] = if rgb[c].is_finite() { worst[c] } else { rgb[c] };
                     }
                 }
             }
-            if !value.iter().all(|v| v.is_finite()) {
-                return Err(LeftOut::NotFinite);
+            if !worst.iter().all(|v| v.is_finite()) {
+                return Err(reason_of(worst.into_iter()));
             }
-            for (channel, v) in self.channels.iter_mut().zip(value) {
-                channel.push(v);
-            }
+            self.patch.extend(&[value]);
         }
         Ok(self.value([0.0; 2], 0))
     }
@@ -216,7 +209,7 @@ impl Sampler<'_> {
     fn value(&mut self, offset_mm: [f32; 2], pixels: u32) -> PointValue {
         let (mut rgb, mut spread) = ([0.0; 3], [0.0; 3]);
         for c in 0..3 {
-            (rgb[c], spread[c]) = median_and_spread(&mut self.channels[c]);
+            (rgb[c], spread[c]) = median_and_spread(self.patch.channel(c), &mut self.room);
         }
         PointValue {
             rgb,
@@ -227,30 +220,13 @@ impl Sampler<'_> {
     }
 }
 
-/// Median, and the quartiles' distance scaled to the standard deviation of a normal distribution.
-/// The slice, which must not be empty, is reordered.
-fn median_and_spread(values: &mut [f32]) -> (f32, f32) {
-    let n = values.len();
-    let middle = n / 2;
-    let (below, upper, above) = values.select_nth_unstable_by(middle, f32::total_cmp);
-    let median = if n % 2 == 1 {
-        *upper
+/// Why values, not all of them finite, are no radiance.
+fn reason_of(mut values: impl Iterator<Item = f32>) -> LeftOut {
+    if values.any(|v| v.is_nan() || v == f32::NEG_INFINITY) {
+        LeftOut::NotFinite
     } else {
-        let lower = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        0.5 * (lower + *upper)
-    };
-    if below.is_empty() || above.is_empty() {
-        return (median, 0.0);
+        LeftOut::Saturated
     }
-    let quarter = n / 4;
-    let upper_at = (n - 1 - quarter).saturating_sub(middle + 1);
-    let high = *above
-        .select_nth_unstable_by(upper_at.min(above.len() - 1), f32::total_cmp)
-        .1;
-    let low = *below
-        .select_nth_unstable_by(quarter.min(below.len() - 1), f32::total_cmp)
-        .1;
-    (median, (high - low) / 1.349)
 }
 
 /// The pixels whose centres lie in a convex quadrilateral, row by row.
@@ -310,20 +286,6 @@ mod tests {
         let grid = SamplingGrid::new(&Rig::paper(400));
         assert_eq!(grid.points_mm().len(), 1225);
         assert_eq!(grid.points_mm()[grid.centre()], [0.0, 0.0]);
-    }
-
-    #[test]
-    fn medians_and_spreads_are_those_of_the_sorted_values() {
-        let mut odd = vec![5.0, 1.0, 3.0, 100.0, 2.0];
-        assert_eq!(median_and_spread(&mut odd).0, 3.0);
-        let mut even = vec![4.0, 1.0, 2.0, 3.0];
-        assert_eq!(median_and_spread(&mut even).0, 2.5);
-        assert_eq!(median_and_spread(&mut [7.0]), (7.0, 0.0));
-        // Of 1 ..= 101 the quartiles are 26 and 76.
-        let mut many: Vec<f32> = (1..=101).rev().map(|i| i as f32).collect();
-        let (median, spread) = median_and_spread(&mut many);
-        assert_eq!(median, 51.0);
-        assert!((spread * 1.349 - 50.0).abs() < 1e-3);
     }
 
     #[test]

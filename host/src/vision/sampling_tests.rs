@@ -189,3 +189,55 @@ fn patches_beyond_material_or_frame_are_left_out() {
     frame.height = 250;
     assert!(count(&frame, LeftOut::Border) > 100);
 }
+
+#[test]
+fn values_are_unbiased_and_scatter_as_little_as_a_median_can() {
+    // The standard error of a median of n normal values is 1.2533 σ/√n.
+    let px = 1024;
+    let mut scene = scene(px);
+    (scene.beam, scene.occluder) = (None, None);
+    let noise = scene.noise.unwrap();
+    let rig = rig(&scene.geometry);
+    let grid = SamplingGrid::new(&rig);
+    let (mut squares, mut count) = (0.0, 0.0);
+    for angles in [
+        [30.0, 140.0, 0.0, 0.0],
+        [0.0, 0.0, 45.0, 200.0],
+        [60.0, 20.0, 60.0, 90.0],
+        [15.0, 10.0, 75.0, 45.0],
+        [85.0, 100.0, 30.0, 280.0],
+    ] {
+        let truth = pose(angles);
+        let mut reading = truth;
+        reading.view.theta += 0.01f64.to_radians();
+        let frame = render(&scene, Surface::Reference, truth, 5);
+        let found = Registrar::new(&rig).register(&frame, reading);
+        let light = IdealLight::new(truth.light, 1.1);
+        let at_centre = true_brdf(scene.reference.as_ref(), &scene.geometry, truth, [0.0; 2]);
+        let mean = at_centre.iter().sum::<f64>() / 3.0;
+        let typical = mean.min(std::f64::consts::FRAC_1_PI) * truth.light.theta.cos();
+        let mut bias = 0.0;
+        for (at, value) in grid
+            .points_mm()
+            .iter()
+            .zip(grid.sample(&frame, &found, None))
+        {
+            let value = value.unwrap();
+            let place = [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]));
+            let f = true_brdf(scene.reference.as_ref(), &scene.geometry, truth, place);
+            let radiance = f[1] * light.irradiance(place);
+            let off = (f64::from(value.rgb[1]) / radiance).ln();
+            let shot = noise.shot * noise.shot * typical * radiance;
+            let sd = (shot + (noise.read * typical).powi(2)).sqrt() / radiance;
+            let limit = 1.2533 * sd / f64::from(value.pixels).sqrt();
+            squares += (off / limit).powi(2);
+            count += 1.0;
+            bias += off / 1225.0;
+        }
+        assert!(bias.abs() < 0.002, "{angles:?}: {bias}");
+    }
+    let ratio = f64::sqrt(squares / count);
+    assert!(ratio < 1.1, "{ratio} times the limit");
+    // Nor can it be much better: then the limit would be a wrong one.
+    assert!(ratio > 0.9, "{ratio} times the limit");
+}

@@ -10,11 +10,13 @@ mod light;
 mod noise;
 mod occluder;
 mod optics;
+mod sensor;
 mod target;
 
 pub use light::Beam;
 pub use noise::Noise;
 pub use occluder::Occluder;
+pub use sensor::RawSensor;
 pub use target::Texture;
 
 use gonia_brdf::direction::{Vec3, local_direction, normalize};

@@ -52,6 +52,11 @@ impl NoiseField {
     }
 }
 
+/// A normally distributed number of variance one for random bits, of which the lowest 13 count.
+pub fn normal_quantile(bits: u64) -> f32 {
+    normal_quantiles()[bits as usize % QUANTILES]
+}
+
 /// A hash of 64 bits (the finaliser of SplitMix64).
 pub fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
