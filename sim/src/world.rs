@@ -4,10 +4,10 @@
 use std::collections::VecDeque;
 
 use gonia_firmware::controller::Controller;
-use gonia_firmware::node::Node;
+use gonia_firmware::node::{Node, identity};
 use gonia_firmware::store::Stored;
-use gonia_protocol::message::{Identity, ResetReason, State};
-use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+use gonia_protocol::message::{ResetReason, State};
+use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
 use crate::bench::Bench;
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
@@ -89,8 +89,11 @@ impl World {
         self.trace
     }
 
+    /// An arm as it is now.
     pub(crate) fn bench(&mut self, arm: Arm) -> &mut Bench {
-        &mut self.arms[arm as usize].bench
+        let bench = &mut self.arms[arm as usize].bench;
+        bench.set_now(self.now_us);
+        bench
     }
 
     pub(crate) fn send(&mut self, arm: Arm, bytes: &[u8]) {
@@ -181,6 +184,9 @@ impl World {
     /// A rising edge on the trigger wire: the camera exposes, the other arm latches.
     fn trigger(&mut self, source: usize) {
         let now_us = self.now_us;
+        for arm in &mut self.arms {
+            arm.bench.set_now(now_us);
+        }
         let record = TriggerRecord {
             sequence: self.triggers.len() as u32,
             time_us: now_us,
@@ -199,7 +205,6 @@ impl World {
             follower.late_edges_us.push_back(now_us + late_us);
             return;
         }
-        follower.bench.set_now(now_us);
         follower.node.trigger_edge(now_us, &mut follower.bench);
         self.send_frames(1 - source);
     }
@@ -208,6 +213,7 @@ impl World {
         let now_us = self.now_us;
         let i = event.arm as usize;
         let arm = &mut self.arms[i];
+        arm.bench.set_now(now_us);
         match event.fault {
             Fault::LoseCycles { axis, cycles } => arm.bench.axis(axis).lose_cycles(cycles),
             Fault::Stall { axis, for_us } => arm.bench.axis(axis).stall_until(now_us + for_us),
@@ -291,18 +297,7 @@ fn boot(
     now_us: u64,
     stored: Option<Stored>,
 ) -> Node {
-    let identity = Identity {
-        protocol_min: PROTOCOL_VERSION,
-        protocol_max: PROTOCOL_VERSION,
-        schema_key: SCHEMA_KEY,
-        firmware: gonia_firmware::VERSION,
-        git: gonia_firmware::git_state(),
-        board: "sim".try_into().unwrap_or_default(),
-        config_crc: 0,
-        boot_id,
-        reset,
-        last_panic: Default::default(),
-    };
+    let identity = identity("sim", boot_id, reset, "");
     Node::new(
         address,
         identity,

@@ -173,11 +173,11 @@ fn rows() -> Vec<Row> {
             HOMES,
         ),
         event(
-            "encoder noise of 0.02° for 20 s",
+            "encoder noise of 0.02° for 60 s",
             Fault::EncoderNoise {
                 axis: THETA,
                 udeg: 20_000.0,
-                for_us: 20_000_000,
+                for_us: 60_000_000,
             },
             "does not settle; latches when its corrections are used up; home is kept",
             &[FaultCode::NOT_REACHED],
