@@ -123,6 +123,14 @@ impl Bench {
         Self::new([axis(Axis::Theta, 21.3e6), axis(Axis::Phi, -12.8e6)], seed)
     }
 
+    /// The arm of the board in QEMU: it stands near its home switches, so that homing takes seconds,
+    /// and leaves nothing to chance, so that the simulator's stands where QEMU's does.
+    pub fn quiet_arm_near_home() -> Self {
+        let axes = [(-5e6, 3e6), (-190e6, -170e6)];
+        let axis = |(home, start)| PlantConfig::worm_axis(home, start).quiet();
+        Self::new(axes.map(axis), 1)
+    }
+
     /// The time at which somebody looks at the arm: whatever steps were due by then are given.
     pub fn set_now(&mut self, now_us: u64) {
         self.now_us = now_us;

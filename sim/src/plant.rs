@@ -87,6 +87,17 @@ impl PlantConfig {
             start_udeg,
         }
     }
+
+    /// The same without what comes by chance or dies down with time: where it stands follows from its
+    /// steps alone, whenever somebody looks.
+    pub fn quiet(self) -> Self {
+        Self {
+            ring_udeg: 0.0,
+            encoder_noise_udeg: 0.0,
+            bounce_us: 0,
+            ..self
+        }
+    }
 }
 
 /// One axis in motion.
@@ -300,10 +311,9 @@ mod tests {
         PlantConfig {
             gear_error_udeg: 0.0,
             microstep_error_udeg: 0.0,
-            ring_udeg: 0.0,
-            encoder_noise_udeg: 0.0,
             eccentricity_udeg: 0.0,
-            ..PlantConfig::worm_axis(-5e6, 10e6)
+            bounce_us: 3_000,
+            ..PlantConfig::worm_axis(-5e6, 10e6).quiet()
         }
     }
 

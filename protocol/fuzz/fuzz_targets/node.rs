@@ -6,10 +6,10 @@ use gonia_firmware::controller::Controller;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::node::{Node, identity};
 use gonia_firmware::steps::{End, Period, Progress};
+use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::frame::encode;
 use gonia_protocol::message::{Hello, Message, Move, ResetReason, Setting, State};
 use gonia_protocol::settings::Axis;
-use gonia_protocol::NODE_LIGHT;
 use libfuzzer_sys::fuzz_target;
 
 #[derive(Default)]
@@ -46,7 +46,11 @@ impl Hardware for Pins {
     fn hold_interlock_open(&mut self, _: bool) {}
     fn set_trigger(&mut self, _: bool) {}
     fn save_settings(&mut self, _: &[u8]) -> Result<(), NotSaved> {
-        if self.sensors & 0x40 == 0 { Ok(()) } else { Err(NotSaved) }
+        if self.sensors & 0x40 == 0 {
+            Ok(())
+        } else {
+            Err(NotSaved)
+        }
     }
 }
 
@@ -64,9 +68,13 @@ fuzz_target!(|bytes: &[u8]| {
         }
         let value = i32::from_le_bytes(word);
         let message = match deed % 16 {
-            0 => Message::Hello(Hello { session: value as u32 }),
+            0 => Message::Hello(Hello {
+                session: value as u32,
+            }),
             1 => Message::Home,
-            2 => Message::Move(Move { target_udeg: [value % 100_000_000, value] }),
+            2 => Message::Move(Move {
+                target_udeg: [value % 100_000_000, value],
+            }),
             3 => Message::Fire,
             4 => Message::Stop,
             5 => Message::EStop,

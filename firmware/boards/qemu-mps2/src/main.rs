@@ -29,7 +29,6 @@ use gonia_firmware::node::{Node, identity};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::message::{Identity, ResetReason};
 use gonia_sim::bench::Bench;
-use gonia_sim::plant::PlantConfig;
 use panic_persist as _;
 use static_cell::StaticCell;
 
@@ -59,10 +58,7 @@ async fn run_arm() {
     static ARM: StaticCell<EmulatedArm> = StaticCell::new();
     let controller = Controller::new(now_us(), None);
     let node = NODE.init(Node::new(NODE_LIGHT, who_it_is(), controller));
-    // Not far above the home switches, so that homing takes seconds.
-    let axes = [(-5e6, 3e6), (-190e6, -170e6)];
-    let axes = axes.map(|(home, start)| PlantConfig::worm_axis(home, start));
-    let arm = ARM.init(EmulatedArm(Bench::new(axes, 1)));
+    let arm = ARM.init(EmulatedArm(Bench::quiet_arm_near_home()));
     defmt::info!("ready");
     let mut bytes = [0; 64];
     loop {
