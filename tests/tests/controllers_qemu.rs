@@ -22,6 +22,13 @@ use gonia_sim::rig::{self, SimRig};
 
 const MINUTE_US: u64 = 60_000_000;
 const N_POSES: usize = 50;
+/// After these poses: a trigger train; the host falls silent; an emergency stop.
+const TRAIN_AFTER: usize = 20;
+const SILENT_AFTER: usize = 35;
+const STOP_AFTER: usize = 42;
+/// A step and a count of the encoder, µdeg. Where an arm stops that is told to stop in mid-move is a
+/// matter of time, and so is which of the steps around a target is reached from there.
+const STEP_UDEG: u32 = 2_500 + 1_374;
 /// The share of bytes that are bent on the way, each way.
 const ONE_IN: u32 = 1500;
 
@@ -113,16 +120,14 @@ impl<T: Transport> Transport for Bent<T> {
 }
 
 /// What the host got to know, without times.
-#[derive(Debug, PartialEq)]
 struct Seen {
     /// Where each move ended, by encoder.
     ends: Vec<(Outcome, [i32; 2])>,
     /// What each pulse latched.
     latches: Vec<([i32; 2], bool)>,
-    /// Steps' idea of where the axes are, at the end.
-    commanded_udeg: [i32; 2],
-    /// Corrections of all moves, and steps missed.
-    counts: [(u32, u32); 2],
+    /// Before the arm is stopped in mid-move: where its steps say it is, µdeg, corrections, and steps
+    /// missed.
+    counts: [(i32, u32, u32); 2],
     settings_crc: u32,
     log: Vec<Option<FaultCode>>,
 }
@@ -154,7 +159,13 @@ fn session(arm: &mut Controller) -> Seen {
         })
     );
     assert!(not_homed);
-    for (key, value) in [(Key::Acceleration, 60_000_000), (Key::SettleWindow, 40_000)] {
+    let faster = [
+        (Key::Acceleration, 60_000_000),
+        (Key::SettleWindow, 40_000),
+        (Key::HomeSlowSpeed, 1_000_000),
+        (Key::HomeBackoff, 300_000),
+    ];
+    for (key, value) in faster {
         for axis in Axis::BOTH {
             arm.set_setting(axis, key, value).unwrap();
             assert_eq!(arm.setting(axis, key).unwrap(), value);
@@ -164,7 +175,7 @@ fn session(arm: &mut Controller) -> Seen {
     home(arm);
 
     let mut ends = Vec::new();
-    let mut latches = Vec::new();
+    let (mut latches, mut counts) = (Vec::new(), Default::default());
     for i in 0..N_POSES {
         let ticket = arm.move_to(target(i)).unwrap();
         let end = arm.wait(ticket, 2 * MINUTE_US).unwrap();
@@ -173,9 +184,13 @@ fn session(arm: &mut Controller) -> Seen {
         }
         ends.push((end.outcome, end.encoder_udeg));
         match i {
-            10 => silence(arm),
-            20 => latches = train(arm),
-            30 => {
+            TRAIN_AFTER => latches = train(arm),
+            SILENT_AFTER => {
+                let axes = arm.status().unwrap().axes;
+                counts = axes.map(|a| (a.commanded_udeg, a.corrections, a.missed_steps));
+                silence(arm);
+            }
+            STOP_AFTER => {
                 arm.emergency_stop().unwrap();
                 assert_eq!(arm.status().unwrap().state, State::EStop);
                 arm.clear_fault().unwrap();
@@ -185,16 +200,11 @@ fn session(arm: &mut Controller) -> Seen {
             _ => {}
         }
     }
-    let status = arm.status().unwrap();
     Seen {
         ends,
         latches,
-        commanded_udeg: status.axes.each_ref().map(|axis| axis.commanded_udeg),
-        counts: status
-            .axes
-            .each_ref()
-            .map(|axis| (axis.corrections, axis.missed_steps)),
-        settings_crc: status.config_crc,
+        counts,
+        settings_crc: arm.status().unwrap().config_crc,
         log: arm.log().unwrap().into_iter().map(|e| e.fault).collect(),
     }
 }
@@ -255,10 +265,18 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     let port = Box::new(rig.port(rig::Arm::Light));
     let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
     let simulated = session(&mut arm);
-    for (i, (here, there)) in in_qemu.ends.iter().zip(&simulated.ends).enumerate() {
-        assert_eq!(here, there, "pose {i}");
+    let after = SILENT_AFTER + 1;
+    assert_eq!(in_qemu.ends[..after], simulated.ends[..after]);
+    for (here, there) in in_qemu.ends[after..].iter().zip(&simulated.ends[after..]) {
+        assert_eq!(here.0, there.0);
+        for (here, there) in here.1.into_iter().zip(there.1) {
+            assert!(here.abs_diff(there) <= STEP_UDEG, "{here} {there}");
+        }
     }
-    assert_eq!(in_qemu, simulated);
+    assert_eq!(in_qemu.latches, simulated.latches);
+    assert_eq!(in_qemu.counts, simulated.counts);
+    assert_eq!(in_qemu.settings_crc, simulated.settings_crc);
+    assert_eq!(in_qemu.log, simulated.log);
 
     let log = std::fs::metadata(folder.path().join("defmt.bin")).unwrap();
     assert!(log.len() > 0, "the log says nothing");
