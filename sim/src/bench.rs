@@ -262,3 +262,55 @@ impl Sectors for RamFlash {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gonia_firmware::axis::AxisDrive;
+    use gonia_firmware::profile::{Profile, Ramp};
+    use gonia_firmware::settings::Settings;
+
+    use super::*;
+
+    /// What docs/boards.md calls the highest step rate.
+    const STEPS_S: u64 = 50_000;
+    /// A control tick of 2 ms, and a main loop that is half a millisecond late every time.
+    const LATE_TICK_US: u64 = 2_500;
+
+    #[test]
+    fn both_axes_keep_their_profile_at_the_highest_step_rate() {
+        let ramp = Ramp::new(STEPS_S * 2_500, 300_000_000, 144_000);
+        let steps = 60_000;
+        let mut profile = Profile::new(steps, ramp).unwrap();
+        let mut ticks = u64::from(profile.interval());
+        let mut fastest = u32::MAX;
+        while profile.advance() {
+            ticks += u64::from(profile.interval());
+            fastest = fastest.min(profile.interval());
+        }
+        assert_eq!(u64::from(fastest), 1_000_000 * TICKS_PER_US / STEPS_S);
+
+        let mut bench = Bench::default_arm(1);
+        let settings = Settings::default();
+        let mut drives = Axis::BOTH.map(|axis| AxisDrive::new(axis, &settings));
+        for drive in &mut drives {
+            drive.run(i64::from(steps), ramp);
+        }
+        let mut now_us = 0;
+        while drives.iter().any(AxisDrive::is_moving) {
+            for drive in &mut drives {
+                drive.feed(&mut bench);
+                drive.look(&mut bench);
+            }
+            now_us += LATE_TICK_US;
+            bench.set_now(now_us);
+            for drive in &mut drives {
+                drive.look(&mut bench);
+            }
+        }
+        let late_us = now_us - ticks / TICKS_PER_US;
+        assert!(late_us < 2 * LATE_TICK_US, "{late_us}");
+        for axis in Axis::BOTH {
+            assert_eq!(bench.progress(axis).given, steps as i32);
+        }
+    }
+}
