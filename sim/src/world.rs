@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use gonia_brdf::direction::{Direction, angle_between};
 use gonia_firmware::controller::Controller;
 use gonia_firmware::node::{Node, identity};
 use gonia_firmware::store::Stored;
@@ -37,6 +38,7 @@ pub(crate) struct World {
     events: Vec<FaultEvent>,
     next_event: usize,
     interlock_open_until_us: u64,
+    bumper_deg: f64,
     triggers: Vec<TriggerRecord>,
     stops: Vec<StopRecord>,
     trace: u64,
@@ -67,6 +69,7 @@ impl World {
             events: plan.events,
             next_event: 0,
             interlock_open_until_us: 0,
+            bumper_deg: 0.0,
             triggers: Vec::new(),
             stops: Vec::new(),
             trace: 0xCBF2_9CE4_8422_2325,
@@ -147,7 +150,8 @@ impl World {
         arm.bench.set_now(now_us);
         if wakes {
             let other_holds = self.arms[1 - i].bench.holds_interlock_open();
-            let closed = !other_holds && now_us >= self.interlock_open_until_us;
+            let closed =
+                !other_holds && now_us >= self.interlock_open_until_us && !self.arms_touch();
             let arm = &mut self.arms[i];
             arm.bench.set_interlock_closed(closed);
             arm.node.poll(now_us, &mut arm.bench);
@@ -169,6 +173,20 @@ impl World {
         for _ in 0..edges {
             self.trigger(i);
         }
+    }
+
+    /// Whether the switch between the arms is open.
+    fn arms_touch(&mut self) -> bool {
+        if self.bumper_deg <= 0.0 {
+            return false;
+        }
+        let now_us = self.now_us;
+        let [light, view] = self.arms.each_mut().map(|arm| {
+            arm.bench.set_now(now_us);
+            let [theta, phi] = arm.bench.true_deg(now_us);
+            Direction::from_deg(theta, phi).to_vec3()
+        });
+        angle_between(light, view).to_degrees() < self.bumper_deg
     }
 
     fn send_frames(&mut self, i: usize) {
@@ -224,6 +242,7 @@ impl World {
             Fault::EncoderJump { axis, udeg } => arm.bench.axis(axis).shift_encoder(udeg),
             Fault::SwitchStuck { axis, reading } => arm.bench.axis(axis).stick_switch(reading),
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
+            Fault::Bumper { deg } => self.bumper_deg = deg,
             Fault::Unplugged { for_us } => {
                 arm.to_device.unplug_until(now_us + for_us);
                 arm.to_host.unplug_until(now_us + for_us);

@@ -26,6 +26,8 @@ use gonia_sim::rig::SimRig;
 const STRIKE_US: u64 = 62_345_678;
 const N_POSES: usize = 30;
 const THETA: Axis = Axis::Theta;
+/// Arms whose directions are nearer than this touch, on a rig that is built so.
+const KEEP_OUT_DEG: f64 = 25.0;
 
 /// What goes wrong.
 enum Cause {
@@ -45,6 +47,10 @@ enum Cause {
     HostGone,
     /// A target in the desk.
     BeyondLimits,
+    /// A pose whose light and view are too near to each other; the host knows how near that is.
+    KeepOut,
+    /// The arms come too near to each other on their way, and a switch between them opens.
+    Bumper,
     /// The camera gives no frame for the sixth pose.
     CameraNotReady,
 }
@@ -334,6 +340,22 @@ fn rows() -> Vec<Row> {
             "stops the session: a person made it stop, a person lets it go on",
         ),
         Row {
+            fault: "arms told to collide, keep-out angle of 25° known to the host",
+            cause: Cause::KeepOut,
+            does: "is not asked",
+            codes: &[],
+            end: End::Stopped("arms would be"),
+            host: "sends no move; stops the session and names the pose",
+        },
+        Row {
+            fault: "arms about to touch on the way, bumper switch in the interlock chain",
+            cause: Cause::Bumper,
+            does: "both controllers stop at once and latch; neither knows where the other's arm is",
+            codes: &[FaultCode::INTERLOCK_OPEN],
+            end: End::Stopped("interlock"),
+            host: "stops the session: a person moves the arms apart",
+        },
+        Row {
             fault: "told to run into the desk or out of its limits",
             cause: Cause::BeyondLimits,
             does: "refuses the move; no step is given",
@@ -408,6 +430,10 @@ fn rig_for(cause: &Cause) -> (SimRig, u64) {
             let arms = [light_arm(*change), Bench::default_arm(22)];
             (SimRig::with_arms(5, FaultPlan::default(), arms), 0)
         }
+        Cause::Bumper => {
+            let bumper = Fault::Bumper { deg: KEEP_OUT_DEG };
+            (SimRig::new(5, at(STRIKE_US, bumper)), STRIKE_US)
+        }
         _ => (SimRig::new(5, FaultPlan::default()), 0),
     }
 }
@@ -452,6 +478,9 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
     let mut arms = Arms::connect(port(Arm::Light), port(Arm::Camera)).unwrap();
     let is_calibrated = arms.uncalibrated().unwrap().len() < 4;
     assert_eq!(is_calibrated, row_calibrates(cause));
+    if matches!(cause, Cause::KeepOut) {
+        arms.set_keep_out_deg(KEEP_OUT_DEG);
+    }
     let poses = poses();
     let result = run_session(&mut arms, &poses, &mut |outcome| {
         let shot = match outcome {
@@ -496,6 +525,7 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
                 "home switch not found",
                 "camera not ready",
                 "interlock",
+                "arms would be",
             ];
             let known = reason.into_iter().find(|reason| line.contains(reason));
             End::Stopped(known.unwrap_or_else(|| panic!("{line}")))

@@ -164,9 +164,10 @@ fn connect(port: &str, baud: u32) -> Result<Controller> {
         Some(_) => bail!("{port}: this system has no Unix sockets"),
         None => StreamTransport::open_serial(port, baud),
     };
+    // Firmware of another protocol still says who it is, gives its log, and stops.
     let transport =
         transport.with_context(|| format!("{port}: cannot be opened; check cable and name"))?;
-    Controller::connect(Box::new(transport), NODE_ANY).with_context(|| port.to_owned())
+    Controller::connect_for_service(Box::new(transport), NODE_ANY).with_context(|| port.to_owned())
 }
 
 fn identify(arm: &mut Controller) -> Result<()> {
@@ -190,6 +191,14 @@ fn identify(arm: &mut Controller) -> Result<()> {
     ];
     if !identity.last_panic.is_empty() {
         rows.push(("last panic".into(), identity.last_panic.to_string()));
+    }
+    if let Err(error) = arm.check_version() {
+        rows.push((
+            "protocol".into(),
+            format!("{error}; until then it is not moved"),
+        ));
+        table::print(&rows);
+        return Ok(());
     }
     for axis in Axis::BOTH {
         let state = if is_uncalibrated(arm, axis)? {
