@@ -50,12 +50,18 @@ fn frame_of(version: u8, request: u16, message: &Message) -> Vec<u8> {
 }
 
 /// Asks a controller of this firmware.
-fn ask(port: &SimPort, frame: &[u8]) -> Message {
+fn ask(port: &SimPort, request: u16, frame: &[u8]) -> Message {
     port.send(frame);
-    let (mut decoder, mut bytes) = (Decoder::new(), Vec::new());
-    port.receive(&mut bytes, 200_000);
-    let answers = bytes.iter().filter_map(|&byte| decoder.push(byte));
-    answers.last().unwrap().message.unwrap()
+    let mut decoder = Decoder::new();
+    for _ in 0..100 {
+        let mut bytes = Vec::new();
+        port.receive(&mut bytes, 10_000);
+        let mut frames = bytes.iter().filter_map(|&byte| decoder.push(byte));
+        if let Some(answer) = frames.find(|frame| frame.header.request == request) {
+            return answer.message.unwrap();
+        }
+    }
+    panic!("no answer to request {request}");
 }
 
 #[test]
@@ -66,7 +72,7 @@ fn new_firmware_refuses_every_motion_of_a_host_of_another_version() {
         let mut request = 0;
         let mut ask = |message: &Message| {
             request += 1;
-            ask(&port, &frame_of(version, request, message))
+            ask(&port, request, &frame_of(version, request, message))
         };
         let hello = ask(&Message::Hello(Hello { session: 7 }));
         let Message::Identity(identity) = hello else {

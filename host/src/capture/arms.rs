@@ -414,8 +414,8 @@ pub enum HomeError {
 }
 
 impl HomeError {
-    /// Whether it may be gone at the next try. A person's stop, other settings, and what homing finds
-    /// wrong with the switch do not go away by themselves.
+    /// Whether it may be gone at the next try. A person's stop, other settings and a switch that does
+    /// not switch do not go away by themselves; a noisy encoder looks like a shifted one while it lasts.
     pub(super) fn may_pass(&self) -> bool {
         match self {
             HomeError::Fault(_, code) => matches!(
@@ -426,6 +426,7 @@ impl HomeError {
                     | FaultCode::NOT_REACHED
                     | FaultCode::LEASE_EXPIRED
                     | FaultCode::STEPS_DISAGREE
+                    | FaultCode::HOME_MISMATCH
             ),
             HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
                 refusal,

@@ -9,7 +9,7 @@ use clap::{Subcommand, ValueEnum};
 use gonia_protocol::NODE_ANY;
 use gonia_protocol::message::{Outcome, State};
 use gonia_protocol::settings::{Axis, MEANINGS, Meaning};
-use std::io::{BufRead, Write};
+use std::io::{BufRead, IsTerminal, Write};
 
 /// Longest homing or move, µs.
 const LIMIT_US: u64 = 240_000_000;
@@ -346,15 +346,19 @@ fn spread(from_deg: f64, to_deg: f64, stands: u16) -> Result<Vec<i32>> {
 }
 
 fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -> Result<()> {
+    let is_person = std::io::stdin().is_terminal();
     let mut lines = std::io::stdin().lock().lines();
     let mut n = 0;
     let mut ask = |arm: &mut Controller, encoder_deg: f64| {
         n += 1;
-        eprint!(
-            "stand {n} of {}: encoder {encoder_deg:.5} deg; reference (deg): ",
-            stands.len()
-        );
-        let _ = std::io::stderr().flush();
+        // Readings from a file need no prompt, and an error is then a line of its own.
+        if is_person {
+            eprint!(
+                "stand {n} of {}: encoder {encoder_deg:.5} deg; reference (deg): ",
+                stands.len()
+            );
+            let _ = std::io::stderr().flush();
+        }
         let line = lines.next().ok_or("the input has ended")?;
         let line = line.map_err(|error| error.to_string())?;
         arm.keep_alive().map_err(|error| error.to_string())?;

@@ -225,7 +225,7 @@ mod tests {
         assert!(plan.bound_s <= plan.travel_s);
         assert!(plan.travel_s < plan.listed_travel_s);
         assert!(
-            plan.travel_s < 1.12 * plan.bound_s,
+            plan.travel_s < 1.1 * plan.bound_s,
             "{} {}",
             plan.travel_s,
             plan.bound_s
