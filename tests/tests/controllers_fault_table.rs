@@ -629,10 +629,35 @@ what happens. In every row no frame is kept whose arms were truly off by more th
 *Time to safe*: from the fault to the arm at rest with a latched fault, in virtual time, for this
 strike; – where nothing has to stop.
 
-What no row can promise: an encoder that shifts by about `steps_disagree` (0.02°) or less is not
-told from the gear's own error (0.035° at worst, where both pull apart), and the eccentricity of an encoder that was never calibrated is not seen
-where it is equal at home and at the target. Calibrate (see [boards.md](boards.md)); `gonia device
-PORT identify` says which axes are not.
+## What no row can promise
+
+An encoder that shifts a little lies to every check that believes it; only the motor's steps and the
+home switch tell. Between home and a pose they may differ by the gear (twice 0.0034°) and by what the
+error map leaves (up to 0.008° on an axis never calibrated, 0.003° on a calibrated one) without anything
+being wrong, so `steps_disagree` cannot be much tighter than its 0.02°. An encoder's shift s is then
+found at rest after any move where s and these add up to more than 0.02°: surely above 0.035° (0.030°
+calibrated), most probably above 0.02° because a session visits every phase of the gear, and never
+below 0.005°. The home switch, to 0.02°, is no finer. A frame taken meanwhile is off by s and the 0.006°
+of the deadband. So for shifts up to 0.024° the pointing limit holds all the same; **between 0.024° and
+0.035° single frames may be off by up to 0.041°** until a pose is visited where it shows. No rig of
+this kind sees more by itself: the camera's arm is checked by the marks in every frame (`camera by the
+marks` in a report: 0.003°), the light's arm needs an index or a second reading head.
+
+The eccentricity of an encoder that was never calibrated is not seen where it is equal at home and at
+the target. Calibrate (see [boards.md](boards.md)); `gonia device PORT identify` says which axes are
+not, and a session says so when it begins.
+
+An arm that slips *after* it has arrived, while it waits for the other one, is seen by its encoder: no
+pulse is given outside `trigger_window` (0.012°). With a window of 0.03°, as it once was, whole sessions
+under random faults kept single frames at 0.0207° and 0.0262°: slips of 0.021° and 0.028°, 11.6 s and
+0.4 s before the pulse, which the encoder had read as 0.0206° and 0.0268° and the window had let pass.
+
+Collisions: the controllers know nothing of each other's arm, only of the chain that both share; so a
+bumper or light barrier between the arms belongs into it. The host knows both and refuses a pose whose
+directions are nearer than the keep-out angle (0 by default: the paper's arms pass at 1.1 m and 1.8 m).
+It looks at poses, not at the way between them: there the bumper is the guard.
+
+## The table
 
 | fault | the controller | code | the host | the session | time to safe |
 |---|---|---|---|---|---|

@@ -180,6 +180,11 @@ fn set(controller: &mut Controller, key: Key, setting: i32) -> Result<(), LinkEr
             let fast = Key::HomeFastSpeed.default_of(axis).min(setting);
             controller.set_setting(axis, Key::HomeFastSpeed, fast)?;
         }
+        if key == Key::Deadband {
+            // No pulse is refused that settling has allowed.
+            let window = Key::TriggerWindow.default_of(axis).max(setting);
+            controller.set_setting(axis, Key::TriggerWindow, window)?;
+        }
         controller.set_setting(axis, key, setting)?;
     }
     // A session compares the settings with those at the last hello.
