@@ -103,7 +103,11 @@ impl Plot {
 
 fn setting_panel(rows: &[MotionRow], poses: usize, limit_deg: f64) -> Markup {
     let hours = |row: &MotionRow| row.pose_s * poses as f64 / 3600.0;
-    let whole: Vec<&MotionRow> = rows.iter().filter(|row| row.stopped.is_none()).collect();
+    // A value with which poses are given up is no choice; the table has it.
+    let whole: Vec<&MotionRow> = rows
+        .iter()
+        .filter(|row| row.stopped.is_none() && row.given_up == 0)
+        .collect();
     let most = |of: &dyn Fn(&MotionRow) -> f64| whole.iter().map(|row| of(row)).fold(0.0, f64::max);
     let plot = Plot {
         x_most: most(&|row| row.max_deg).max(limit_deg) * 1.08,
