@@ -1,6 +1,6 @@
 //! `gonia device` against `gonia sim-device`, as a person at the bench uses it, in real time.
 #![cfg(unix)]
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod common;
 

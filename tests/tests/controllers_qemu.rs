@@ -93,7 +93,7 @@ impl<T> Bent<T> {
                 .wrapping_mul(1_664_525)
                 .wrapping_add(1_013_904_223);
             let dice = self.state >> 8;
-            if dice % ONE_IN == 0 {
+            if dice.is_multiple_of(ONE_IN) {
                 *byte ^= 1 << (dice / ONE_IN % 8);
             }
         }
