@@ -73,7 +73,8 @@ pub enum Key {
     MaxCorrections = 16,
     /// Largest difference of steps and encoder while moving, µdeg.
     FollowingLimit = 17,
-    /// Largest error at which a trigger pulse is given, µdeg.
+    /// Largest error at which a trigger pulse is given, µdeg. Well below the pointing limit: an arm that
+    /// has arrived first may slip while it waits for the other one.
     TriggerWindow = 18,
     /// The host must be heard this often while moving or armed, µs. Of the node: both axes share it.
     Lease = 19,
@@ -232,7 +233,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "trigger_window",
         "µdeg",
         (1000, 30_000),
-        [30_000; 2],
+        [12_000; 2],
     ),
     m(
         Key::Lease,

@@ -1,6 +1,8 @@
 //! Two axes behind the firmware's hardware trait: everything that one controller is wired to.
 
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::profile::TICKS_PER_US;
+use gonia_firmware::steps::{End, Period, Progress, REST_TICKS, StepChannel, StepTimer};
 use gonia_firmware::store::{RECORD_MAX, Sectors, Store, Stored};
 use gonia_protocol::settings::{Axis, Key};
 
@@ -10,6 +12,7 @@ use crate::plant::{AxisPlant, PlantConfig};
 #[derive(Debug)]
 pub struct Bench {
     axes: [AxisPlant; 2],
+    steps: [StepChannel<VirtualTimer>; 2],
     now_us: u64,
     trigger: bool,
     rising_edges: u32,
@@ -17,6 +20,66 @@ pub struct Bench {
     interlock_closed: bool,
     store: Store,
     flash: RamFlash,
+}
+
+/// A timer with preloaded registers, in virtual time.
+#[derive(Debug)]
+struct VirtualTimer {
+    /// When the running period ends, 1/256 µs.
+    ends_ticks: u64,
+    reload: u32,
+    now_ticks: u64,
+    up: bool,
+}
+
+impl VirtualTimer {
+    fn at_rest(now_us: u64) -> StepChannel<Self> {
+        let now_ticks = now_us * TICKS_PER_US;
+        StepChannel::new(Self {
+            ends_ticks: now_ticks + u64::from(REST_TICKS),
+            reload: REST_TICKS,
+            now_ticks,
+            up: true,
+        })
+    }
+}
+
+impl StepTimer for VirtualTimer {
+    // The channel itself says what a period has ended with.
+    fn end_with_pulse(&mut self, _: bool) {}
+
+    fn reload(&mut self, ticks: u32) {
+        self.reload = ticks;
+    }
+
+    fn restart(&mut self, ticks: u32) {
+        self.ends_ticks = self.now_ticks + u64::from(ticks);
+        self.reload = ticks;
+    }
+
+    fn set_direction(&mut self, up: bool) {
+        self.up = up;
+    }
+}
+
+/// Lets the timer run up to now.
+fn play(steps: &mut StepChannel<VirtualTimer>, plant: &mut AxisPlant, now_us: u64) {
+    let now_ticks = now_us * TICKS_PER_US;
+    let is_playing = steps.progress().is_playing;
+    let timer = steps.timer();
+    let rest = u64::from(REST_TICKS);
+    if !is_playing && timer.ends_ticks + rest < now_ticks {
+        // Nothing happens in all these rests.
+        timer.ends_ticks += (now_ticks - timer.ends_ticks) / rest * rest;
+    }
+    while steps.timer().ends_ticks <= now_ticks {
+        let timer = steps.timer();
+        let ended_ticks = timer.ends_ticks;
+        timer.ends_ticks += u64::from(timer.reload);
+        if steps.period_ended() == End::Step {
+            plant.step(steps.timer().up, ended_ticks / TICKS_PER_US);
+        }
+    }
 }
 
 /// Two sectors that keep their bytes through a restart, until the power goes while one is written.
@@ -37,6 +100,7 @@ impl Bench {
                 AxisPlant::new(theta, seed.wrapping_mul(2)),
                 AxisPlant::new(phi, seed.wrapping_mul(2).wrapping_add(1)),
             ],
+            steps: [0; 2].map(|_| VirtualTimer::at_rest(0)),
             now_us: 0,
             trigger: false,
             rising_edges: 0,
@@ -59,9 +123,20 @@ impl Bench {
         Self::new([axis(Axis::Theta, 21.3e6), axis(Axis::Phi, -12.8e6)], seed)
     }
 
-    /// The time at which the firmware looks at its pins.
+    /// The arm of the board in QEMU: it stands near its home switches, so that homing takes seconds,
+    /// and leaves nothing to chance, so that the simulator's stands where QEMU's does.
+    pub fn quiet_arm_near_home() -> Self {
+        let axes = [(-5e6, 3e6), (-190e6, -170e6)];
+        let axis = |(home, start)| PlantConfig::worm_axis(home, start).quiet();
+        Self::new(axes.map(axis), 1)
+    }
+
+    /// The time at which somebody looks at the arm: whatever steps were due by then are given.
     pub fn set_now(&mut self, now_us: u64) {
         self.now_us = now_us;
+        for (steps, plant) in self.steps.iter_mut().zip(&mut self.axes) {
+            play(steps, plant, now_us);
+        }
     }
 
     /// One of the axes.
@@ -110,12 +185,23 @@ impl Bench {
     pub fn reset_outputs(&mut self) {
         self.trigger = false;
         self.holds_interlock_open = false;
+        self.steps = [0; 2].map(|_| VirtualTimer::at_rest(self.now_us));
     }
 }
 
 impl Hardware for Bench {
-    fn step(&mut self, axis: Axis, forward: bool, due_us: u64) {
-        self.axes[axis.index()].step(forward, due_us);
+    fn queue_step(&mut self, axis: Axis, period: Period) {
+        // The firmware has asked whether there is room.
+        let _ = self.steps[axis.index()].push(period);
+    }
+
+    fn progress(&mut self, axis: Axis) -> Progress {
+        self.steps[axis.index()].progress()
+    }
+
+    fn halt(&mut self, axis: Axis) {
+        self.steps[axis.index()].timer().now_ticks = self.now_us * TICKS_PER_US;
+        self.steps[axis.index()].halt();
     }
 
     fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
@@ -173,6 +259,58 @@ impl Sectors for RamFlash {
             Err(NotSaved)
         } else {
             Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gonia_firmware::axis::AxisDrive;
+    use gonia_firmware::profile::{Profile, Ramp};
+    use gonia_firmware::settings::Settings;
+
+    use super::*;
+
+    /// What docs/boards.md calls the highest step rate.
+    const STEPS_S: u64 = 50_000;
+    /// A control tick of 2 ms, and a main loop that is half a millisecond late every time.
+    const LATE_TICK_US: u64 = 2_500;
+
+    #[test]
+    fn both_axes_keep_their_profile_at_the_highest_step_rate() {
+        let ramp = Ramp::new(STEPS_S * 2_500, 300_000_000, 144_000);
+        let steps = 60_000;
+        let mut profile = Profile::new(steps, ramp).unwrap();
+        let mut ticks = u64::from(profile.interval());
+        let mut fastest = u32::MAX;
+        while profile.advance() {
+            ticks += u64::from(profile.interval());
+            fastest = fastest.min(profile.interval());
+        }
+        assert_eq!(u64::from(fastest), 1_000_000 * TICKS_PER_US / STEPS_S);
+
+        let mut bench = Bench::default_arm(1);
+        let settings = Settings::default();
+        let mut drives = Axis::BOTH.map(|axis| AxisDrive::new(axis, &settings));
+        for drive in &mut drives {
+            drive.run(i64::from(steps), ramp);
+        }
+        let mut now_us = 0;
+        while drives.iter().any(AxisDrive::is_moving) {
+            for drive in &mut drives {
+                drive.feed(&mut bench);
+                drive.look(&mut bench);
+            }
+            now_us += LATE_TICK_US;
+            bench.set_now(now_us);
+            for drive in &mut drives {
+                drive.look(&mut bench);
+            }
+        }
+        let late_us = now_us - ticks / TICKS_PER_US;
+        assert!(late_us < 2 * LATE_TICK_US, "{late_us}");
+        for axis in Axis::BOTH {
+            assert_eq!(bench.progress(axis).given, steps as i32);
         }
     }
 }

@@ -117,6 +117,11 @@ pub enum Fault {
         /// How long, µs.
         for_us: u64,
     },
+    /// From now on a switch between the arms opens the interlock's chain while they are near.
+    Bumper {
+        /// Nearer than this, by the directions that they point in, degrees.
+        deg: f64,
+    },
     /// The cable is out, both ways.
     Unplugged {
         /// How long, µs.

@@ -3,6 +3,7 @@
 //! | room | subject |
 //! |---|---|
 //! | [`plant`] | motor, gear, shaft, encoder and switch of one axis (`no_std`) |
+//! | [`swing`] | how an arm swings on its gear (`no_std`) |
 //! | [`bench`](mod@bench) | two such axes behind the firmware's hardware trait (`no_std`) |
 //! | [`fault`], [`random_faults`] | what may go wrong, as data; whole bad days by a seed |
 //! | [`wire`] | bytes under way between host and controller |
@@ -12,6 +13,7 @@
 
 pub mod bench;
 pub mod plant;
+pub mod swing;
 
 #[cfg(feature = "std")]
 pub mod fault;

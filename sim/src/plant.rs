@@ -12,8 +12,7 @@ use core::f64::consts::TAU;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Steps further apart than this belong to two runs, µs.
-const NEW_RUN_US: u64 = 50_000;
+use crate::swing::Swing;
 
 /// What an axis is made of. Angles of the shaft in µdeg.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,9 +33,7 @@ pub struct PlantConfig {
     pub worm_turn_udeg: f64,
     /// Amplitude of the motor's deviation between full steps, periodic in the magnetic cycle.
     pub microstep_error_udeg: f64,
-    /// Amplitude of the arm's swing when a run at full speed ends.
-    pub ring_udeg: f64,
-    /// Frequency of the swing, Hz.
+    /// Frequency at which the arm swings on its gear, Hz; 0 for a stiff arm.
     pub ring_hz: f64,
     /// Time in which the swing falls to 1/e, s.
     pub ring_decay_s: f64,
@@ -61,8 +58,8 @@ impl PlantConfig {
     /// motor, 8 microsteps, 90:1 worm, 18-bit ring encoder.
     ///
     /// Play 0.015° and gear error ±0.003° are those of a good worm stage (54 and 11 arc seconds).
-    /// The swing follows from the arm: 30°/s² at 10 Hz natural frequency deflect it by
-    /// 30/(2π·10)² = 0.0076°, and 8 % damping gives 0.2 s of decay. Pull-out at 600 rpm of the
+    /// The arm swings at 10 Hz, as one of 10 kg·m² does on a gear of 40 kN·m/rad, and 8 % damping let
+    /// it die down in 0.2 s; 30°/s² bend it by 30/(2π·10)² = 0.0076°. Pull-out at 600 rpm of the
     /// motor. Noise of half a count, and 0.004° of eccentricity left after calibration, which a
     /// 70 mm ring has at 2.5 µm off centre.
     pub fn worm_axis(home_udeg: f64, start_udeg: f64) -> Self {
@@ -75,7 +72,6 @@ impl PlantConfig {
             gear_error_udeg: 3_000.0,
             worm_turn_udeg: 4e6,
             microstep_error_udeg: 400.0,
-            ring_udeg: 7_600.0,
             ring_hz: 10.0,
             ring_decay_s: 0.2,
             encoder_counts: 1 << 18,
@@ -85,6 +81,17 @@ impl PlantConfig {
             home_udeg,
             bounce_us: 3_000,
             start_udeg,
+        }
+    }
+
+    /// The same without what comes by chance or dies down with time: where it stands follows from its
+    /// steps alone, whenever somebody looks.
+    pub fn quiet(self) -> Self {
+        Self {
+            ring_hz: 0.0,
+            encoder_noise_udeg: 0.0,
+            bounce_us: 0,
+            ..self
         }
     }
 }
@@ -101,8 +108,7 @@ pub struct AxisPlant {
     slipped_udeg: f64,
     /// Steps/s of the last step, signed.
     rate: f64,
-    /// The fastest step of this run, steps/s.
-    peak_rate: f64,
+    swing: Swing,
     last_step_us: u64,
     switch_closed: bool,
     switch_chatters_until_us: u64,
@@ -125,7 +131,7 @@ impl AxisPlant {
             output_udeg: config.start_udeg,
             slipped_udeg: 0.0,
             rate: 0.0,
-            peak_rate: 0.0,
+            swing: Swing::new(config.ring_hz, config.ring_decay_s),
             last_step_us: 0,
             switch_closed: config.start_udeg <= config.home_udeg,
             switch_chatters_until_us: 0,
@@ -151,8 +157,7 @@ impl AxisPlant {
         let rate = direction * 1e6 / interval_us as f64;
         let jump = libm::fabs(rate - self.rate);
         self.rate = rate;
-        let is_new_run = interval_us > NEW_RUN_US;
-        self.peak_rate = libm::fabs(rate).max(if is_new_run { 0.0 } else { self.peak_rate });
+        self.swing.step(direction * self.step_udeg, at_us);
         if jump > self.config.pull_in_steps_s && libm::fabs(rate) > self.config.pull_in_steps_s
             || libm::fabs(rate) > self.config.pull_out_steps_s
         {
@@ -169,7 +174,7 @@ impl AxisPlant {
         let motor = self.motor_udeg;
         let gear = config.gear_error_udeg * libm::sin(TAU * (motor / config.worm_turn_udeg))
             + config.microstep_error_udeg * libm::sin(TAU * (motor / cycle_udeg));
-        self.output_udeg + self.slipped_udeg + gear + self.swing_udeg(now_us)
+        self.output_udeg + self.slipped_udeg + gear + self.swing.udeg(now_us)
     }
 
     /// What the encoder says, in counts of one turn; `None` when it does not answer.
@@ -263,21 +268,6 @@ impl AxisPlant {
             .output_udeg
             .clamp(self.motor_udeg - half, self.motor_udeg + half);
     }
-
-    fn swing_udeg(&self, now_us: u64) -> f64 {
-        let since_s = now_us.saturating_sub(self.last_step_us) as f64 * 1e-6;
-        // After 12 decay times it is below a hundred-thousandth: spare the functions.
-        if self.last_step_us == 0 || since_s > 12.0 * self.config.ring_decay_s {
-            return 0.0;
-        }
-        // A short run ends before the arm has bent as far as its deceleration would bend it: then
-        // it swings with what speed it had, v/ω, and with a step at least.
-        let from_speed = self.peak_rate * self.step_udeg / (TAU * self.config.ring_hz);
-        let amplitude = from_speed.max(self.step_udeg).min(self.config.ring_udeg);
-        let amplitude = amplitude * libm::exp(-since_s / self.config.ring_decay_s);
-        let sign = if self.rate < 0.0 { -1.0 } else { 1.0 };
-        sign * amplitude * libm::sin(TAU * self.config.ring_hz * since_s)
-    }
 }
 
 /// A number of mean 0 and variance 1, from four uniform ones of 16 bits: bell-shaped to ±3.4, which
@@ -300,10 +290,9 @@ mod tests {
         PlantConfig {
             gear_error_udeg: 0.0,
             microstep_error_udeg: 0.0,
-            ring_udeg: 0.0,
-            encoder_noise_udeg: 0.0,
             eccentricity_udeg: 0.0,
-            ..PlantConfig::worm_axis(-5e6, 10e6)
+            bounce_us: 3_000,
+            ..PlantConfig::worm_axis(-5e6, 10e6).quiet()
         }
     }
 

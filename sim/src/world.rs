@@ -3,11 +3,12 @@
 
 use std::collections::VecDeque;
 
+use gonia_brdf::direction::{Direction, angle_between};
 use gonia_firmware::controller::Controller;
-use gonia_firmware::node::Node;
+use gonia_firmware::node::{Node, identity};
 use gonia_firmware::store::Stored;
-use gonia_protocol::message::{Identity, ResetReason, State};
-use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+use gonia_protocol::message::{ResetReason, State};
+use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
 use crate::bench::Bench;
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
@@ -37,6 +38,7 @@ pub(crate) struct World {
     events: Vec<FaultEvent>,
     next_event: usize,
     interlock_open_until_us: u64,
+    bumper_deg: f64,
     triggers: Vec<TriggerRecord>,
     stops: Vec<StopRecord>,
     trace: u64,
@@ -67,6 +69,7 @@ impl World {
             events: plan.events,
             next_event: 0,
             interlock_open_until_us: 0,
+            bumper_deg: 0.0,
             triggers: Vec::new(),
             stops: Vec::new(),
             trace: 0xCBF2_9CE4_8422_2325,
@@ -89,8 +92,11 @@ impl World {
         self.trace
     }
 
+    /// An arm as it is now.
     pub(crate) fn bench(&mut self, arm: Arm) -> &mut Bench {
-        &mut self.arms[arm as usize].bench
+        let bench = &mut self.arms[arm as usize].bench;
+        bench.set_now(self.now_us);
+        bench
     }
 
     pub(crate) fn send(&mut self, arm: Arm, bytes: &[u8]) {
@@ -144,7 +150,8 @@ impl World {
         arm.bench.set_now(now_us);
         if wakes {
             let other_holds = self.arms[1 - i].bench.holds_interlock_open();
-            let closed = !other_holds && now_us >= self.interlock_open_until_us;
+            let closed =
+                !other_holds && now_us >= self.interlock_open_until_us && !self.arms_touch();
             let arm = &mut self.arms[i];
             arm.bench.set_interlock_closed(closed);
             arm.node.poll(now_us, &mut arm.bench);
@@ -168,6 +175,20 @@ impl World {
         }
     }
 
+    /// Whether the switch between the arms is open.
+    fn arms_touch(&mut self) -> bool {
+        if self.bumper_deg <= 0.0 {
+            return false;
+        }
+        let now_us = self.now_us;
+        let [light, view] = self.arms.each_mut().map(|arm| {
+            arm.bench.set_now(now_us);
+            let [theta, phi] = arm.bench.true_deg(now_us);
+            Direction::from_deg(theta, phi).to_vec3()
+        });
+        angle_between(light, view).to_degrees() < self.bumper_deg
+    }
+
     fn send_frames(&mut self, i: usize) {
         let arm = &mut self.arms[i];
         while let Some(frame) = arm.node.take_frame() {
@@ -181,6 +202,9 @@ impl World {
     /// A rising edge on the trigger wire: the camera exposes, the other arm latches.
     fn trigger(&mut self, source: usize) {
         let now_us = self.now_us;
+        for arm in &mut self.arms {
+            arm.bench.set_now(now_us);
+        }
         let record = TriggerRecord {
             sequence: self.triggers.len() as u32,
             time_us: now_us,
@@ -199,7 +223,6 @@ impl World {
             follower.late_edges_us.push_back(now_us + late_us);
             return;
         }
-        follower.bench.set_now(now_us);
         follower.node.trigger_edge(now_us, &mut follower.bench);
         self.send_frames(1 - source);
     }
@@ -208,6 +231,7 @@ impl World {
         let now_us = self.now_us;
         let i = event.arm as usize;
         let arm = &mut self.arms[i];
+        arm.bench.set_now(now_us);
         match event.fault {
             Fault::LoseCycles { axis, cycles } => arm.bench.axis(axis).lose_cycles(cycles),
             Fault::Stall { axis, for_us } => arm.bench.axis(axis).stall_until(now_us + for_us),
@@ -218,6 +242,7 @@ impl World {
             Fault::EncoderJump { axis, udeg } => arm.bench.axis(axis).shift_encoder(udeg),
             Fault::SwitchStuck { axis, reading } => arm.bench.axis(axis).stick_switch(reading),
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
+            Fault::Bumper { deg } => self.bumper_deg = deg,
             Fault::Unplugged { for_us } => {
                 arm.to_device.unplug_until(now_us + for_us);
                 arm.to_host.unplug_until(now_us + for_us);
@@ -291,18 +316,7 @@ fn boot(
     now_us: u64,
     stored: Option<Stored>,
 ) -> Node {
-    let identity = Identity {
-        protocol_min: PROTOCOL_VERSION,
-        protocol_max: PROTOCOL_VERSION,
-        schema_key: SCHEMA_KEY,
-        firmware: gonia_firmware::VERSION,
-        git: gonia_firmware::git_state(),
-        board: "sim".try_into().unwrap_or_default(),
-        config_crc: 0,
-        boot_id,
-        reset,
-        last_panic: Default::default(),
-    };
+    let identity = identity("sim", boot_id, reset, "");
     Node::new(
         address,
         identity,

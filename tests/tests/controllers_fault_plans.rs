@@ -62,6 +62,9 @@ struct Day {
     result: Result<SessionSummary, SessionError>,
     kept: usize,
     worst_deg: f64,
+    /// Of that shot: by encoder, and when, µs.
+    worst_by_encoder_deg: f64,
+    worst_us: u64,
     trace: u64,
     virtual_us: u64,
 }
@@ -81,6 +84,7 @@ fn day(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Day {
     let wait_us = BEGIN_US - rig.now_us();
     arms.light().rest(wait_us).unwrap();
     let (mut kept, mut worst_deg) = (0, 0.0f64);
+    let (mut worst_by_encoder_deg, mut worst_us) = (0.0, 0);
     let result = run_session(&mut arms, poses, &mut |outcome| {
         if let ShotOutcome::Refused { index, reason } = &outcome {
             println!(
@@ -93,7 +97,11 @@ fn day(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Day {
             let pose = poses[shot.index];
             for (a, b) in [(pose.light, truth.light), (pose.view, truth.view)] {
                 let off = angle_between(a.to_vec3(), b.to_vec3());
-                worst_deg = worst_deg.max(off.to_degrees());
+                if off.to_degrees() > worst_deg {
+                    worst_deg = off.to_degrees();
+                    worst_by_encoder_deg = shot.pointing_error_deg;
+                    worst_us = rig.triggers().last().unwrap().time_us;
+                }
             }
             kept += 1;
         }
@@ -103,6 +111,8 @@ fn day(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Day {
         result,
         kept,
         worst_deg,
+        worst_by_encoder_deg,
+        worst_us,
         trace: rig.trace(),
         virtual_us: rig.now_us() - BEGIN_US,
     }
@@ -135,6 +145,19 @@ fn print(seed: u64, plan: &FaultPlan, day: &Day) {
             s.refused, s.retakes, s.recoveries, s.requests_repeated
         ),
         Err(error) => println!("stopped: {error}"),
+    }
+}
+
+/// What happened to the arms shortly before the worst shot was triggered.
+fn print_cause(plan: &FaultPlan, day: &Day) {
+    println!(
+        "  the worst shot: {:.4}° by encoder; before it:",
+        day.worst_by_encoder_deg
+    );
+    let before = day.worst_us.saturating_sub(40_000_000)..=day.worst_us;
+    for event in plan.events.iter().filter(|e| before.contains(&e.at_us)) {
+        let ahead_ms = (day.worst_us - event.at_us) as f64 * 1e-3;
+        println!("  {ahead_ms:.0} ms: {:?} {:?}", event.arm, event.fault);
     }
 }
 
@@ -218,6 +241,7 @@ fn the_papers_plan_on_bad_days() {
         let plan = random_faults(seed, weather(poses.len(), 300, u32::from(seed % 4 == 0)));
         let day = day(seed, plan.clone(), &poses);
         print(seed, &plan, &day);
+        print_cause(&plan, &day);
         check(seed, &day, poses.len());
     }
 }

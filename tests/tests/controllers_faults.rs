@@ -408,7 +408,8 @@ fn session(rig: &SimRig, poses: &[Pose]) -> (Result<SessionSummary, SessionError
 fn a_session_gets_over_a_stall_a_restart_a_pulled_cable_and_a_missed_trigger() {
     let stall = Fault::Stall {
         axis: Axis::Theta,
-        for_us: 3_000_000,
+        // Longer than a pose takes, so that a move falls into it.
+        for_us: 6_000_000,
     };
     for (fault, recoveries) in [
         (stall, 1),

@@ -1,4 +1,5 @@
-//! The firmware as real ARM code in QEMU, over a Unix socket: the same client, the same core.
+//! The firmware as real ARM code in QEMU, over a Unix socket, and the simulator beside it: the same
+//! host, the same commands, the same core; so the same answers, positions and counts.
 //!
 //! Needs `GONIA_QEMU_ELF` (firmware/boards/qemu-mps2/target/thumbv7em-none-eabihf/release/
 //! gonia-qemu-mps2) and `qemu-system-arm`; so it is ignored unless `cargo xtask test` asks
@@ -11,11 +12,25 @@ use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use gonia::link::{Controller, LinkError, StreamTransport, Transport};
-use gonia_protocol::NODE_ANY;
+use gonia_protocol::NODE_LIGHT;
+use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{Arm, Outcome, Refusal, State, Trigger};
 use gonia_protocol::settings::{Axis, Key};
+use gonia_sim::bench::Bench;
+use gonia_sim::fault::FaultPlan;
+use gonia_sim::rig::{self, SimRig};
 
 const MINUTE_US: u64 = 60_000_000;
+const N_POSES: usize = 50;
+/// After these poses: a trigger train; the host falls silent; an emergency stop.
+const TRAIN_AFTER: usize = 20;
+const SILENT_AFTER: usize = 35;
+const STOP_AFTER: usize = 42;
+/// A step and a count of the encoder, µdeg. Where an arm stops that is told to stop in mid-move is a
+/// matter of time, and so is which of the steps around a target is reached from there.
+const STEP_UDEG: u32 = 2_500 + 1_374;
+/// The share of bytes that are bent on the way, each way.
+const ONE_IN: u32 = 1500;
 
 /// A running emulator; it dies with this value.
 struct Qemu(Child);
@@ -43,15 +58,8 @@ fn image() -> PathBuf {
 fn start(elf: &Path, folder: &Path) -> (Qemu, StreamTransport) {
     let socket = folder.join("wire.sock");
     let child = Command::new("qemu-system-arm")
-        .args([
-            "-M",
-            "mps2-an386",
-            "-display",
-            "none",
-            "-monitor",
-            "none",
-            "-serial",
-        ])
+        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+        .arg("-serial")
         .arg(format!("unix:{},server=on,wait=off", socket.display()))
         .arg("-serial")
         .arg(format!("file:{}", folder.join("defmt.bin").display()))
@@ -70,19 +78,78 @@ fn start(elf: &Path, folder: &Path) -> (Qemu, StreamTransport) {
     }
 }
 
-#[test]
-#[ignore = "needs qemu-system-arm and the board's program; cargo xtask test runs it"]
-fn arm_code_homes_reaches_poses_and_latches_a_train() {
-    let elf = image();
-    let folder = tempfile::tempdir().unwrap();
-    let (_qemu, mut transport) = start(&elf, folder.path());
-    // Noise first: the other end must find the frames that follow.
-    transport.send(&[0xFF, 1, 2, 3, 0, 0, 9]).unwrap();
-    let mut arm = Controller::connect(Box::new(transport), NODE_ANY).unwrap();
-    assert_eq!(arm.name(), "light arm");
-    assert_eq!(arm.identity().board.as_str(), "qemu-mps2");
-    assert_eq!(arm.identity().firmware, gonia_firmware::VERSION);
+/// A wire that flips a bit of a byte now and then, both ways.
+struct Bent<T> {
+    wire: T,
+    state: u32,
+}
 
+impl<T> Bent<T> {
+    fn bend(&mut self, bytes: &mut [u8]) {
+        for byte in bytes {
+            // A linear congruential generator (Numerical Recipes): as good as a wire's bad luck.
+            self.state = self
+                .state
+                .wrapping_mul(1_664_525)
+                .wrapping_add(1_013_904_223);
+            let dice = self.state >> 8;
+            if dice.is_multiple_of(ONE_IN) {
+                *byte ^= 1 << (dice / ONE_IN % 8);
+            }
+        }
+    }
+}
+
+impl<T: Transport> Transport for Bent<T> {
+    fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        let mut bytes = bytes.to_vec();
+        self.bend(&mut bytes);
+        self.wire.send(&bytes)
+    }
+
+    fn receive(&mut self, out: &mut Vec<u8>, timeout_us: u64) -> std::io::Result<()> {
+        let before = out.len();
+        self.wire.receive(out, timeout_us)?;
+        self.bend(&mut out[before..]);
+        Ok(())
+    }
+
+    fn now_us(&self) -> u64 {
+        self.wire.now_us()
+    }
+}
+
+/// What the host got to know, without times.
+struct Seen {
+    /// Where each move ended, by encoder.
+    ends: Vec<(Outcome, [i32; 2])>,
+    /// What each pulse latched.
+    latches: Vec<([i32; 2], bool)>,
+    /// Before the arm is stopped in mid-move: where its steps say it is, µdeg, corrections, and steps
+    /// missed.
+    counts: [(i32, u32, u32); 2],
+    settings_crc: u32,
+    log: Vec<Option<FaultCode>>,
+}
+
+fn home(arm: &mut Controller) {
+    let homing = arm.home().unwrap();
+    let end = arm.wait(homing, 2 * MINUTE_US).unwrap();
+    assert_eq!(end.outcome, Outcome::Done);
+    assert!(arm.status().unwrap().homed);
+}
+
+/// Poses within 8° of home, up and down, near and far.
+fn target(i: usize) -> [i32; 2] {
+    let i = i as i32;
+    [
+        (i * 1_370_000).rem_euclid(8_000_000) - 1_000_000,
+        (i * 2_930_000).rem_euclid(9_000_000) - 184_000_000,
+    ]
+}
+
+/// Hello was said. Homing, poses, a fault, a train, an emergency stop, homing, poses.
+fn session(arm: &mut Controller) -> Seen {
     let refused = arm.move_to([0, 0]);
     let not_homed = matches!(
         refused,
@@ -92,55 +159,125 @@ fn arm_code_homes_reaches_poses_and_latches_a_train() {
         })
     );
     assert!(not_homed);
-    arm.set_setting(Axis::Phi, Key::HomeFastSpeed, 12_000_000)
-        .unwrap();
-    assert_eq!(
-        arm.setting(Axis::Phi, Key::HomeFastSpeed).unwrap(),
-        12_000_000
-    );
-
-    let homing = arm.home().unwrap();
-    assert_eq!(
-        arm.wait(homing, 2 * MINUTE_US).unwrap().outcome,
-        Outcome::Done
-    );
-    assert!(arm.status().unwrap().homed);
-
-    for target in [
-        [0, -185_000_000],
-        [15_000_000, -170_000_000],
-        [12_500_000, -175_250_000],
-    ] {
-        let ticket = arm.move_to(target).unwrap();
-        let end = arm.wait(ticket, 2 * MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Done, "{target:?}");
-        for (encoder, target) in end.encoder_udeg.into_iter().zip(target) {
-            assert!(encoder.abs_diff(target) <= 6000, "{encoder} {target}");
+    let faster = [
+        (Key::Acceleration, 60_000_000),
+        (Key::SettleWindow, 40_000),
+        (Key::HomeSlowSpeed, 1_000_000),
+        (Key::HomeBackoff, 300_000),
+    ];
+    for (key, value) in faster {
+        for axis in Axis::BOTH {
+            arm.set_setting(axis, key, value).unwrap();
+            assert_eq!(arm.setting(axis, key).unwrap(), value);
         }
     }
+    arm.save_settings().unwrap();
+    home(arm);
 
+    let mut ends = Vec::new();
+    let (mut latches, mut counts) = (Vec::new(), Default::default());
+    for i in 0..N_POSES {
+        let ticket = arm.move_to(target(i)).unwrap();
+        let end = arm.wait(ticket, 2 * MINUTE_US).unwrap();
+        for (encoder, target) in end.encoder_udeg.into_iter().zip(target(i)) {
+            assert!(encoder.abs_diff(target) <= 6000, "{i}: {encoder} {target}");
+        }
+        ends.push((end.outcome, end.encoder_udeg));
+        match i {
+            TRAIN_AFTER => latches = train(arm),
+            SILENT_AFTER => {
+                let axes = arm.status().unwrap().axes;
+                counts = axes.map(|a| (a.commanded_udeg, a.corrections, a.missed_steps));
+                silence(arm);
+            }
+            STOP_AFTER => {
+                arm.emergency_stop().unwrap();
+                assert_eq!(arm.status().unwrap().state, State::EStop);
+                arm.clear_fault().unwrap();
+                assert_eq!(arm.status().unwrap().state, State::Unhomed);
+                home(arm);
+            }
+            _ => {}
+        }
+    }
+    Seen {
+        ends,
+        latches,
+        counts,
+        settings_crc: arm.status().unwrap().config_crc,
+        log: arm.log().unwrap().into_iter().map(|e| e.fault).collect(),
+    }
+}
+
+/// The host falls silent in mid-move: the arm stops by itself, latches, and is cleared.
+fn silence(arm: &mut Controller) {
+    arm.set_setting(Axis::Theta, Key::Lease, 200_000).unwrap();
+    arm.move_to([0, -100_000_000]).unwrap();
+    arm.rest(1_500_000).unwrap();
+    let status = arm.status().unwrap();
+    assert_eq!(status.state, State::Fault(FaultCode::LEASE_EXPIRED));
+    assert!(status.homed, "it slowed down: no step was lost");
+    arm.clear_fault().unwrap();
+    arm.set_setting(Axis::Theta, Key::Lease, 2_000_000).unwrap();
+}
+
+fn train(arm: &mut Controller) -> Vec<([i32; 2], bool)> {
+    let pulses = [1000, 4000, 16_000];
     let train = Arm {
         trigger: Trigger::Source,
-        exposures_us: [1000, 4000, 16_000].into_iter().collect(),
+        exposures_us: pulses.into_iter().collect(),
         gap_us: 500,
     };
     arm.arm(train).unwrap();
     let fired = arm.fire().unwrap();
     assert_eq!(arm.wait(fired, MINUTE_US).unwrap().outcome, Outcome::Done);
-    for pulse in 0..3 {
+    let latch = |pulse| {
         let latch = arm.latch(pulse).unwrap();
-        assert!(latch.within);
-        assert!(latch.encoder_udeg[0].abs_diff(12_500_000) <= 30_000);
-    }
+        (latch.encoder_udeg, latch.within)
+    };
+    (0..pulses.len() as u8).map(latch).collect()
+}
 
-    arm.emergency_stop().unwrap();
-    assert_eq!(arm.status().unwrap().state, State::EStop);
-    arm.clear_fault().unwrap();
-    assert_eq!(arm.status().unwrap().state, State::Unhomed);
-    assert!(
-        arm.status().unwrap().frames_bad >= 1,
-        "the noise was counted"
+#[test]
+#[ignore = "needs qemu-system-arm and the board's program; cargo xtask test runs it"]
+fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
+    let elf = image();
+    let folder = tempfile::tempdir().unwrap();
+    let (_qemu, transport) = start(&elf, folder.path());
+    let bent = Bent {
+        wire: transport,
+        state: 1,
+    };
+    let mut arm = Controller::connect(Box::new(bent), NODE_LIGHT).unwrap();
+    assert_eq!(arm.identity().board.as_str(), "qemu-mps2");
+    assert_eq!(arm.identity().firmware, gonia_firmware::VERSION);
+    let in_qemu = session(&mut arm);
+    let status = arm.status().unwrap();
+    let (good, bad) = (status.frames_good, status.frames_bad);
+    let (lost, repeated) = arm.losses();
+    println!(
+        "QEMU: {N_POSES} poses; frames {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
     );
+    assert!(bad > 0 && repeated > 0, "the wire bent nothing");
+
+    let arms = [Bench::quiet_arm_near_home(), Bench::default_arm(2)];
+    let rig = SimRig::with_arms(1, FaultPlan::default(), arms);
+    let port = Box::new(rig.port(rig::Arm::Light));
+    let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
+    let simulated = session(&mut arm);
+    let after = SILENT_AFTER + 1;
+    assert_eq!(in_qemu.ends[..after], simulated.ends[..after]);
+    for (here, there) in in_qemu.ends[after..].iter().zip(&simulated.ends[after..]) {
+        assert_eq!(here.0, there.0);
+        for (here, there) in here.1.into_iter().zip(there.1) {
+            assert!(here.abs_diff(there) <= STEP_UDEG, "{here} {there}");
+        }
+    }
+    assert_eq!(in_qemu.latches, simulated.latches);
+    assert_eq!(in_qemu.counts, simulated.counts);
+    assert_eq!(in_qemu.settings_crc, simulated.settings_crc);
+    assert_eq!(in_qemu.log, simulated.log);
+
     let log = std::fs::metadata(folder.path().join("defmt.bin")).unwrap();
     assert!(log.len() > 0, "the log says nothing");
 }

@@ -9,11 +9,12 @@ use std::sync::{Arc, Mutex};
 use gonia::link::{Controller, Transport};
 use gonia_firmware::controller::Controller as Firmware;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::node::Node;
+use gonia_firmware::node::{Node, identity};
 use gonia_firmware::settings::Settings;
-use gonia_protocol::message::{Identity, ResetReason};
+use gonia_firmware::steps::{Period, Progress};
+use gonia_protocol::NODE_LIGHT;
+use gonia_protocol::message::ResetReason;
 use gonia_protocol::settings::{Axis, Key};
-use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 use gonia_sim::fault::WireFaults;
 use gonia_sim::wire::Wire;
 
@@ -36,7 +37,11 @@ struct Board {
 }
 
 impl Hardware for Board {
-    fn step(&mut self, _: Axis, _: bool, _: u64) {}
+    fn queue_step(&mut self, _: Axis, _: Period) {}
+    fn progress(&mut self, _: Axis) -> Progress {
+        Progress::default()
+    }
+    fn halt(&mut self, _: Axis) {}
     fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
         Ok(1000)
     }
@@ -66,18 +71,7 @@ struct Line {
 
 impl Line {
     fn new(seed: u64) -> Self {
-        let identity = Identity {
-            protocol_min: PROTOCOL_VERSION,
-            protocol_max: PROTOCOL_VERSION,
-            schema_key: SCHEMA_KEY,
-            firmware: gonia_firmware::VERSION,
-            git: gonia_firmware::git_state(),
-            board: "soak".try_into().unwrap(),
-            config_crc: 0,
-            boot_id: 1,
-            reset: ResetReason::PowerOn,
-            last_panic: Default::default(),
-        };
+        let identity = identity("soak", 1, ResetReason::PowerOn, "");
         Self {
             now_us: 0,
             node: Node::new(NODE_LIGHT, identity, Firmware::new(0, None)),

@@ -1,5 +1,6 @@
 //! The project's own chores. `cargo xtask test` does all that a change must pass.
 
+mod fuzz;
 mod size;
 mod steps;
 mod tools;
@@ -7,7 +8,7 @@ mod tools;
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-cargo xtask test    set up what the tests need, then fmt, clippy, boards, all tests
+cargo xtask test    set up what the tests need, then fmt, clippy, boards, all tests, a short fuzz
 cargo xtask boards  build the firmware of every board
 cargo xtask size    flash and RAM of every board against its budget
 cargo xtask fuzz    let the fuzzer loose on the protocol for a minute a target";

@@ -1,5 +1,6 @@
 //! What the chores do, step by step.
 
+use crate::fuzz;
 use crate::size::{budget_of, size_of};
 use crate::tools::{TARGET, add_target, install, run};
 use anyhow::{Context, Result, bail};
@@ -49,6 +50,7 @@ pub fn test() -> Result<()> {
             "qemu-system-arm is missing: apt-get install qemu-system-arm",
         );
     }
+    fuzz_all(&mut table, &root, FUZZ_BRIEFLY_S)?;
     table.print();
     Ok(())
 }
@@ -97,31 +99,30 @@ fn check_sizes(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Seconds that the fuzzer has for a target.
+/// Seconds that the fuzzer has for a target by itself, and among all tests.
 const FUZZ_S: u32 = 60;
+const FUZZ_BRIEFLY_S: u32 = 5;
 
-/// Runs every fuzz target of the protocol for a while. Says so where the fuzzer is missing.
+/// Runs every fuzz target of the protocol for a while.
 pub fn fuzz() -> Result<()> {
-    let root = root()?;
-    let has_fuzzer = Command::new("cargo")
-        .args(["fuzz", "--version"])
-        .output()
-        .is_ok_and(|output| output.status.success());
     let mut table = Table::default();
-    if !has_fuzzer {
-        table.not_run("fuzzing", "cargo-fuzz is missing: cargo install cargo-fuzz");
+    fuzz_all(&mut table, &root()?, FUZZ_S)?;
+    table.print();
+    Ok(())
+}
+
+/// Says so where the fuzzer cannot run.
+fn fuzz_all(table: &mut Table, root: &Path, seconds: u32) -> Result<()> {
+    if let Some(why) = fuzz::missing() {
+        table.not_run("fuzzing", why);
         return Ok(());
     }
-    for target in ["decoder", "link", "node"] {
+    table.step("build the fuzzers", || fuzz::build(root))?;
+    for target in fuzz::TARGETS {
         table.step(&format!("fuzz {target}"), || {
-            let mut command = cargo(&root.join("protocol"));
-            // The sanitizer is a feature of the nightly compiler that the stable one has too.
-            command.env("RUSTC_BOOTSTRAP", "1");
-            let seconds = format!("-max_total_time={FUZZ_S}");
-            run(command.args(["fuzz", "run", target, "--", &seconds]))
+            fuzz::run_target(root, target, seconds)
         })?;
     }
-    table.print();
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! One axis: steps given, encoder followed, segments of a move.
+//! One axis: steps queued for its timer, encoder followed, segments of a move.
 
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::AxisStatus;
@@ -8,8 +8,13 @@ use crate::error_map::ErrorMap;
 use crate::hardware::Hardware;
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
 use crate::settings::Settings;
+use crate::steps::{DEPTH, End, Period};
 
 const TURN_UDEG: i64 = 360_000_000;
+/// The timer has steps for so long: four control ticks, 1/256 µs. A stop begins so much later.
+const AHEAD_TICKS: u32 = 8_000 * TICKS_PER_US as u32;
+/// Periods that wait at least, however long they are.
+const AHEAD_MIN: usize = 2;
 /// Bad readings in a row that make a fault; fewer are left out.
 const MAX_BAD_READINGS: u8 = 3;
 /// Movement between two readings that is always plausible: noise, a knock, ringing.
@@ -19,11 +24,18 @@ const ALWAYS_PLAUSIBLE_UDEG: i64 = 200_000;
 #[derive(Debug)]
 pub struct AxisDrive {
     axis: Axis,
+    /// Steps that are still to be queued.
     profile: Option<Profile>,
     forward: bool,
-    due_ticks: u64,
+    /// The direction that was queued last.
+    queued_forward: Option<bool>,
     /// The way from below, after a segment that went down.
     take_up: Option<(u32, Ramp)>,
+    /// The timer has something to do.
+    is_playing: bool,
+    /// The timer's count of steps, when it was last looked at.
+    given: i32,
+    /// Steps given.
     steps: i64,
     base_steps: i64,
     base_udeg: i64,
@@ -65,8 +77,10 @@ impl AxisDrive {
             axis,
             profile: None,
             forward: true,
-            due_ticks: u64::MAX,
+            queued_forward: None,
             take_up: None,
+            is_playing: false,
+            given: 0,
             steps: 0,
             base_steps: 0,
             base_udeg: 0,
@@ -90,16 +104,7 @@ impl AxisDrive {
 
     /// Whether steps are being given.
     pub fn is_moving(&self) -> bool {
-        self.profile.is_some()
-    }
-
-    /// Time of the next step, µs; `u64::MAX` at rest.
-    pub fn wake_us(&self) -> u64 {
-        if self.due_ticks == u64::MAX {
-            u64::MAX
-        } else {
-            self.due_ticks.div_ceil(TICKS_PER_US)
-        }
+        self.profile.is_some() || self.is_playing
     }
 
     /// Where the encoder says the axis is, µdeg.
@@ -124,71 +129,89 @@ impl AxisDrive {
         }
     }
 
-    /// Gives every step that is due.
-    pub fn give_steps(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        let now_ticks = now_us * TICKS_PER_US;
-        while self.due_ticks <= now_ticks {
-            let Some(profile) = &mut self.profile else {
-                self.due_ticks = u64::MAX;
+    /// Takes note of the steps that the timer has given since the last time.
+    pub fn look(&mut self, hardware: &mut impl Hardware) {
+        let progress = hardware.progress(self.axis);
+        self.steps += i64::from(progress.given.wrapping_sub(self.given));
+        self.given = progress.given;
+        self.is_playing = progress.is_playing;
+    }
+
+    /// Queues steps until the timer has enough for a while.
+    pub fn feed(&mut self, hardware: &mut impl Hardware) {
+        let mut waiting = hardware.progress(self.axis).waiting;
+        while let Some(profile) = &mut self.profile {
+            let interval = profile.interval();
+            let enough = (AHEAD_TICKS / interval.max(1)) as usize;
+            if waiting >= enough.clamp(AHEAD_MIN, DEPTH - 1) {
                 return;
+            }
+            let mut push = |ticks, end| {
+                hardware.queue_step(self.axis, Period::new(ticks, end));
+                waiting += 1;
             };
-            hardware.step(self.axis, self.forward, self.due_ticks / TICKS_PER_US);
-            self.steps += if self.forward { 1 } else { -1 };
-            if profile.advance() {
-                self.due_ticks += u64::from(profile.interval());
-            } else {
+            // The first interval of a run is long: half of it before the turn, half after.
+            let mut ticks = interval;
+            if self.queued_forward != Some(self.forward) {
+                self.queued_forward = Some(self.forward);
+                push(interval / 2, End::Turn(self.forward));
+                ticks -= interval / 2;
+            }
+            push(ticks, End::Step);
+            self.is_playing = true;
+            if !profile.advance() {
                 let next = self.take_up.take();
-                let from_ticks = self.due_ticks;
-                self.begin(
-                    next.and_then(|(steps, ramp)| Profile::new(steps, ramp)),
-                    from_ticks,
-                    true,
-                );
+                self.profile = next.and_then(|(steps, ramp)| Profile::new(steps, ramp));
+                self.forward = true;
             }
         }
     }
 
-    /// Starts a run of steps, up for positive ones. Whatever was under way is dropped.
-    pub fn run(&mut self, now_us: u64, steps: i64, ramp: Ramp) {
+    /// Starts a run of steps, up for positive ones, from rest.
+    pub fn run(&mut self, steps: i64, ramp: Ramp) {
         self.take_up = None;
         self.rebase();
         let count = u32::try_from(steps.unsigned_abs()).unwrap_or(u32::MAX);
-        self.begin(Profile::new(count, ramp), now_us * TICKS_PER_US, steps > 0);
+        self.profile = Profile::new(count, ramp);
+        self.forward = steps > 0;
     }
 
     /// Starts a run to an absolute angle.
-    pub fn go_to(&mut self, now_us: u64, target_udeg: i32, settings: &Settings) {
+    pub fn go_to(&mut self, target_udeg: i32, settings: &Settings) {
         let way_udeg = i64::from(target_udeg) - i64::from(self.encoder.udeg);
-        self.go_by(now_us, way_udeg, settings);
+        self.go_by(way_udeg, settings);
     }
 
     /// Starts a run over an angle; its last part always leads up, so that the gear's backlash is
     /// taken from one side.
-    pub fn go_by(&mut self, now_us: u64, way_udeg: i64, settings: &Settings) {
+    pub fn go_by(&mut self, way_udeg: i64, settings: &Settings) {
         let ramp = self.ramp(settings, Key::MaxSpeed);
         let steps = self.steps_of(way_udeg);
         if steps >= 0 {
-            self.run(now_us, steps, ramp);
+            self.run(steps, ramp);
             return;
         }
         let take_up = self.steps_of(i64::from(settings.get(self.axis, Key::BacklashTakeup)));
-        self.run(now_us, steps - take_up, ramp);
+        self.run(steps - take_up, ramp);
         self.take_up = u32::try_from(take_up).ok().map(|up| (up, ramp));
     }
 
-    /// Slows down and stops; nothing follows.
+    /// Slows down and stops, after the steps that wait already; nothing follows.
     pub fn decelerate(&mut self) {
         self.take_up = None;
         if !self.profile.as_mut().is_some_and(Profile::decelerate) {
-            self.halt();
+            self.profile = None;
         }
     }
 
     /// Stops at once.
-    pub fn halt(&mut self) {
+    pub fn halt(&mut self, hardware: &mut impl Hardware) {
         self.take_up = None;
         self.profile = None;
-        self.due_ticks = u64::MAX;
+        // A turn may be among what is dropped.
+        self.queued_forward = None;
+        hardware.halt(self.axis);
+        self.look(hardware);
     }
 
     /// Counts a correction of an error of so many µdeg; a large one means that steps were missed.
@@ -320,12 +343,6 @@ impl AxisDrive {
     /// Starts a new move: the following error counts from here.
     pub fn clear_following(&mut self) {
         self.following_udeg = 0;
-    }
-
-    fn begin(&mut self, profile: Option<Profile>, from_ticks: u64, forward: bool) {
-        self.due_ticks = profile.map_or(u64::MAX, |p| from_ticks + u64::from(p.interval()));
-        self.profile = profile;
-        self.forward = forward;
     }
 
     fn rebase(&mut self) {

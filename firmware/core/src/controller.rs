@@ -110,11 +110,7 @@ impl Controller {
     /// When [`Self::poll`] must be called next, µs.
     pub fn wake_us(&self) -> u64 {
         let train = self.train.as_ref().map_or(u64::MAX, Train::wake_us);
-        self.drives[0]
-            .wake_us()
-            .min(self.drives[1].wake_us())
-            .min(self.next_tick_us)
-            .min(train)
+        self.next_tick_us.min(train)
     }
 
     /// The oldest event that nobody has taken.
@@ -141,10 +137,11 @@ impl Controller {
         self.lease_until_us = now_us + self.settings.get_u64(Axis::Theta, Key::Lease);
     }
 
-    /// Does whatever is due: steps, pulses, and every tick the control of both axes.
+    /// Does whatever is due: pulses, and every tick the control of both axes; and sees to it that the
+    /// step timers have something to do until the next tick.
     pub fn poll(&mut self, now_us: u64, hardware: &mut impl Hardware) {
         for drive in &mut self.drives {
-            drive.give_steps(now_us, hardware);
+            drive.look(hardware);
         }
         if self.train.is_some() {
             self.give_pulses(now_us, hardware);
@@ -158,6 +155,13 @@ impl Controller {
             };
             self.next_tick_us = now_us + period;
         }
+        self.feed(hardware);
+    }
+
+    fn feed(&mut self, hardware: &mut impl Hardware) {
+        for drive in &mut self.drives {
+            drive.feed(hardware);
+        }
     }
 
     /// Executes a request, once.
@@ -169,6 +173,21 @@ impl Controller {
         hardware: &mut impl Hardware,
     ) -> Answer {
         self.renew_lease(now_us);
+        for drive in &mut self.drives {
+            drive.look(hardware);
+        }
+        let answer = self.obey(now_us, request, message, hardware);
+        self.feed(hardware);
+        answer
+    }
+
+    fn obey(
+        &mut self,
+        now_us: u64,
+        request: u16,
+        message: &Message,
+        hardware: &mut impl Hardware,
+    ) -> Answer {
         match message {
             Message::GetStatus => Ok(Message::Status(self.status(now_us))),
             Message::Stop => self.stop(now_us, hardware),
@@ -300,7 +319,7 @@ impl Controller {
         self.settle = [None; 2];
         for (drive, target) in self.drives.iter_mut().zip(target_udeg) {
             drive.clear_following();
-            drive.go_to(now_us, target, &self.settings);
+            drive.go_to(target, &self.settings);
         }
         self.job = Some(request);
         self.enter(State::Moving, now_us);
@@ -481,7 +500,7 @@ impl Controller {
             let Some(homing) = homing else { continue };
             let axis = drive.axis();
             let closed = hardware.home_switch_closed(axis);
-            if let Err(code) = homing.tick(now_us, closed, drive, &self.settings) {
+            if let Err(code) = homing.tick(now_us, closed, drive, &self.settings, hardware) {
                 self.fault_unless_latched(now_us, code, Some(axis), hardware);
                 return;
             }
@@ -557,7 +576,7 @@ impl Controller {
                 self.corrections[i] += 1;
                 drive.note_correction(error, &self.settings);
                 // The mean, not the last reading: that one has the noise and the swing in it.
-                drive.go_by(now_us, -i64::from(error), &self.settings);
+                drive.go_by(-i64::from(error), &self.settings);
                 self.settle[i] = None;
                 Ok(false)
             }
@@ -674,7 +693,7 @@ impl Controller {
     }
 
     fn emergency_stop(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        self.drives.iter_mut().for_each(AxisDrive::halt);
+        self.halt(hardware);
         hardware.set_trigger(false);
         // Stopping at once may have lost steps.
         self.homed = false;
@@ -694,15 +713,22 @@ impl Controller {
             return;
         }
         hardware.set_trigger(false);
-        self.fault(now_us, code, axis);
-    }
-
-    fn fault(&mut self, now_us: u64, code: FaultCode, axis: Option<Axis>) {
         if code == FaultCode::LEASE_EXPIRED {
             self.drives.iter_mut().for_each(AxisDrive::decelerate);
         } else {
-            self.drives.iter_mut().for_each(AxisDrive::halt);
+            self.halt(hardware);
         }
+        self.fault(now_us, code, axis);
+    }
+
+    fn halt(&mut self, hardware: &mut impl Hardware) {
+        for drive in &mut self.drives {
+            drive.halt(hardware);
+        }
+    }
+
+    /// Latches a fault; the caller has stopped the arm.
+    fn fault(&mut self, now_us: u64, code: FaultCode, axis: Option<Axis>) {
         self.homed &= !code.loses_home();
         self.note_fault(now_us, code, axis);
         self.enter(State::Fault(code), now_us);

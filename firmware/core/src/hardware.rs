@@ -2,6 +2,8 @@
 
 use gonia_protocol::settings::Axis;
 
+use crate::steps::{Period, Progress};
+
 /// The encoder did not answer, or its answer failed its own check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderLost;
@@ -12,8 +14,15 @@ pub struct NotSaved;
 
 /// Pins, encoders and memory of one arm.
 pub trait Hardware {
-    /// Gives one step. `due_us` is when it was due, which is a little earlier than now.
-    fn step(&mut self, axis: Axis, forward: bool, due_us: u64);
+    /// Queues a period for the step timer of an axis. One that finds no room is lost: the caller has
+    /// asked [`Self::progress`] before.
+    fn queue_step(&mut self, axis: Axis, period: Period);
+
+    /// How far the step timer of an axis is.
+    fn progress(&mut self, axis: Axis) -> Progress;
+
+    /// No step of this axis after this; whatever waits is dropped.
+    fn halt(&mut self, axis: Axis);
 
     /// The absolute encoder of the shaft, in counts of one turn.
     fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost>;

@@ -8,6 +8,7 @@ use gonia_protocol::fault::FaultCode;
 use gonia_protocol::settings::Key;
 
 use crate::axis::AxisDrive;
+use crate::hardware::Hardware;
 use crate::settings::Settings;
 
 /// Equal readings that end a bounce of the switch (at one reading every 2 ms).
@@ -74,18 +75,19 @@ impl Homing {
         switch_closed: bool,
         drive: &mut AxisDrive,
         settings: &Settings,
+        hardware: &mut impl Hardware,
     ) -> Result<(), FaultCode> {
         let steady = self.is_steady(switch_closed);
         let backoff = i64::from(settings.get(drive.axis(), Key::HomeBackoff));
         match self.phase {
-            Phase::Look if steady && switch_closed => self.clear(now_us, drive, settings),
+            Phase::Look if steady && switch_closed => self.clear(drive, settings),
             Phase::Look if steady => {
                 // The whole travel, and a tenth more.
                 let axis = drive.axis();
                 let travel = i64::from(settings.get(axis, Key::SoftMax))
                     - i64::from(settings.get(axis, Key::HomeAngle));
                 let ramp = drive.ramp(settings, Key::HomeFastSpeed);
-                drive.run(now_us, -drive.steps_of(travel * 11 / 10), ramp);
+                drive.run(-drive.steps_of(travel * 11 / 10), ramp);
                 self.phase = Phase::Seek;
             }
             Phase::Seek if switch_closed && steady => {
@@ -93,18 +95,14 @@ impl Homing {
                 self.phase = Phase::Stop;
             }
             Phase::Seek if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
-            Phase::Stop if !drive.is_moving() => self.clear(now_us, drive, settings),
+            Phase::Stop if !drive.is_moving() => self.clear(drive, settings),
             Phase::Clear if !switch_closed && steady => {
                 drive.decelerate();
                 self.phase = Phase::StopAbove;
             }
             Phase::Clear if !drive.is_moving() => return Err(FaultCode::HOME_SWITCH_STUCK),
             Phase::StopAbove if !drive.is_moving() => {
-                drive.run(
-                    now_us,
-                    drive.steps_of(backoff),
-                    clearing_ramp(drive, settings),
-                );
+                drive.run(drive.steps_of(backoff), clearing_ramp(drive, settings));
                 self.phase = Phase::BackOff;
             }
             Phase::BackOff if !drive.is_moving() => {
@@ -112,14 +110,14 @@ impl Homing {
                     return Err(FaultCode::HOME_SWITCH_STUCK);
                 }
                 let ramp = drive.ramp(settings, Key::HomeSlowSpeed);
-                drive.run(now_us, -drive.steps_of(backoff * 3), ramp);
+                drive.run(-drive.steps_of(backoff * 3), ramp);
                 self.phase = Phase::Approach;
             }
             // The first contact counts, bounce or not: the encoder has the angle.
             Phase::Approach if switch_closed => {
-                drive.halt();
+                drive.halt(hardware);
                 drive.set_turn_at_home(settings)?;
-                drive.go_to(now_us, settings.get(drive.axis(), Key::SoftMin), settings);
+                drive.go_to(settings.get(drive.axis(), Key::SoftMin), settings);
                 self.phase = Phase::Park;
             }
             Phase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
@@ -134,12 +132,12 @@ impl Homing {
         Ok(())
     }
 
-    fn clear(&mut self, now_us: u64, drive: &mut AxisDrive, settings: &Settings) {
+    fn clear(&mut self, drive: &mut AxisDrive, settings: &Settings) {
         let get = |key| i64::from(settings.get(drive.axis(), key));
         // What the fast search ran past the switch: v²/2a.
         let overrun = get(Key::HomeFastSpeed).pow(2) / (2 * get(Key::Acceleration)).max(1);
         let way = overrun + MAX_BELOW * get(Key::HomeBackoff);
-        drive.run(now_us, drive.steps_of(way), clearing_ramp(drive, settings));
+        drive.run(drive.steps_of(way), clearing_ramp(drive, settings));
         self.same_readings = 0;
         self.phase = Phase::Clear;
     }

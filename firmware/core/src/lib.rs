@@ -8,11 +8,11 @@
 //! | [`node`] | the wire's end: frames to commands, answers and events to frames |
 //! | [`controller`] | the states and their one owner |
 //! | [`axis`] | one axis: steps, encoder, segments of a move |
-//! | [`profile`] | when the next step is due |
+//! | [`profile`], [`steps`] | when the next step is due; from the main loop to the timer that gives it |
 //! | [`homing`], [`settle`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
 //! | [`error_map`] | what the encoder reads wrong over a turn, and its removal |
 //! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
-//! | [`hardware`], [`pins`] | what a board must offer, and step/direction pins over `embedded-hal` |
+//! | [`hardware`], [`ssi`] | what a board must offer; an absolute encoder over `embedded-hal` |
 #![no_std]
 
 pub mod axis;
@@ -21,10 +21,11 @@ pub mod error_map;
 pub mod hardware;
 pub mod homing;
 pub mod node;
-pub mod pins;
 pub mod profile;
 pub mod settings;
 pub mod settle;
+pub mod ssi;
+pub mod steps;
 pub mod store;
 pub mod train;
 

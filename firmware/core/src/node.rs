@@ -2,12 +2,33 @@
 
 use gonia_protocol::frame::{Decoder, FrameBytes, Received, encode};
 use gonia_protocol::link::{Arrival, Responder};
-use gonia_protocol::message::{Identity, Message, Refusal};
-use gonia_protocol::{NODE_ANY, PROTOCOL_VERSION};
+use gonia_protocol::message::{Identity, Message, Refusal, ResetReason};
+use gonia_protocol::{NODE_ANY, PROTOCOL_VERSION, SCHEMA_KEY};
 use heapless::Deque;
 
 use crate::controller::Controller;
 use crate::hardware::Hardware;
+
+/// Who a controller is that has just started. Git state, versions and schema are this firmware's.
+pub fn identity(board: &str, boot_id: u32, reset: ResetReason, last_panic: &str) -> Identity {
+    Identity {
+        protocol_min: PROTOCOL_VERSION,
+        protocol_max: PROTOCOL_VERSION,
+        schema_key: SCHEMA_KEY,
+        firmware: crate::VERSION,
+        git: crate::git_state(),
+        board: cut(board),
+        config_crc: 0,
+        boot_id,
+        reset,
+        last_panic: cut(last_panic),
+    }
+}
+
+/// As much of a text as fits, without what is not ASCII.
+fn cut<const N: usize>(text: &str) -> heapless::String<N> {
+    text.chars().filter(char::is_ascii).take(N).collect()
+}
 
 /// Frames that may wait for the wire.
 const OUTBOX: usize = 12;

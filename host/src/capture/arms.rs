@@ -49,6 +49,8 @@ pub struct Arms {
     light: Controller,
     camera: Controller,
     phi_limits_deg: [[f64; 2]; 2],
+    /// Directions of light and view nearer to each other than this would make the arms touch.
+    pub(super) keep_out_deg: f64,
     /// An arm stands beyond its limits, where only homing helps, although it knows where it is.
     pub(super) must_home: bool,
     /// The last target of each arm, µdeg: where φ is.
@@ -80,6 +82,7 @@ impl Arms {
             light,
             camera,
             phi_limits_deg,
+            keep_out_deg: 0.0,
             must_home: false,
             at_udeg: [[0; 2]; 2],
         })
@@ -112,6 +115,24 @@ impl Arms {
         Ok(found)
     }
 
+    /// What a person should hear of that before a session; nothing when all is well.
+    ///
+    /// # Errors
+    /// The link failed.
+    pub fn calibration_warning(&mut self) -> Result<Option<String>, LinkError> {
+        let axes: Vec<String> = self
+            .uncalibrated()?
+            .into_iter()
+            .map(|(arm, axis)| format!("{arm} {}", format!("{axis:?}").to_lowercase()))
+            .collect();
+        Ok((!axes.is_empty()).then(|| {
+            format!(
+                "encoders never calibrated: {}; how far they are off over the turn is not known (gonia device PORT calibrate)",
+                axes.join(", ")
+            )
+        }))
+    }
+
     /// Now, by the arms' clock, µs: virtual on a simulated rig.
     pub fn now_us(&self) -> u64 {
         self.camera.now_us()
@@ -137,6 +158,12 @@ impl Arms {
         }
         self.options = options;
         Ok(())
+    }
+
+    /// No pose is taken whose light and view are nearer to each other than this, degrees: on rigs whose
+    /// arms can touch. 0, the default, for arms that pass each other at different distances.
+    pub fn set_keep_out_deg(&mut self, keep_out_deg: f64) {
+        self.keep_out_deg = keep_out_deg;
     }
 
     /// Homes those arms that do not know where they are, both at once.
@@ -387,8 +414,8 @@ pub enum HomeError {
 }
 
 impl HomeError {
-    /// Whether it may be gone at the next try. A person's stop, other settings, and what homing finds
-    /// wrong with the switch do not go away by themselves.
+    /// Whether it may be gone at the next try. A person's stop, other settings and a switch that does
+    /// not switch do not go away by themselves; a noisy encoder looks like a shifted one while it lasts.
     pub(super) fn may_pass(&self) -> bool {
         match self {
             HomeError::Fault(_, code) => matches!(
@@ -399,6 +426,7 @@ impl HomeError {
                     | FaultCode::NOT_REACHED
                     | FaultCode::LEASE_EXPIRED
                     | FaultCode::STEPS_DISAGREE
+                    | FaultCode::HOME_MISMATCH
             ),
             HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
                 refusal,

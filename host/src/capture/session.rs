@@ -1,7 +1,7 @@
 //! Every pose of a list, one after the other.
 
 use gonia_brdf::Pose;
-use gonia_brdf::direction::Direction;
+use gonia_brdf::direction::{Direction, angle_between};
 use gonia_protocol::message::{Refusal, State};
 
 use super::arms::{Arms, HomeError, Try};
@@ -144,6 +144,16 @@ fn take(
     pose: &Pose,
     summary: &mut SessionSummary,
 ) -> Result<ShotOutcome, SessionError> {
+    let apart_deg = angle_between(pose.light.to_vec3(), pose.view.to_vec3()).to_degrees();
+    if apart_deg < arms.keep_out_deg {
+        return Err(SessionError::OutOfReach {
+            index,
+            reason: format!(
+                "the arms would be {apart_deg:.1}° apart, and touch below {:.1}°",
+                arms.keep_out_deg
+            ),
+        });
+    }
     let mut reason = String::new();
     for retakes in 0..=arms.options.max_retakes {
         summary.retakes += u32::from(retakes > 0);

@@ -9,7 +9,7 @@ use clap::{Subcommand, ValueEnum};
 use gonia_protocol::NODE_ANY;
 use gonia_protocol::message::{Outcome, State};
 use gonia_protocol::settings::{Axis, MEANINGS, Meaning};
-use std::io::{BufRead, Write};
+use std::io::{BufRead, IsTerminal, Write};
 
 /// Longest homing or move, µs.
 const LIMIT_US: u64 = 240_000_000;
@@ -164,9 +164,10 @@ fn connect(port: &str, baud: u32) -> Result<Controller> {
         Some(_) => bail!("{port}: this system has no Unix sockets"),
         None => StreamTransport::open_serial(port, baud),
     };
+    // Firmware of another protocol still says who it is, gives its log, and stops.
     let transport =
         transport.with_context(|| format!("{port}: cannot be opened; check cable and name"))?;
-    Controller::connect(Box::new(transport), NODE_ANY).with_context(|| port.to_owned())
+    Controller::connect_for_service(Box::new(transport), NODE_ANY).with_context(|| port.to_owned())
 }
 
 fn identify(arm: &mut Controller) -> Result<()> {
@@ -190,6 +191,14 @@ fn identify(arm: &mut Controller) -> Result<()> {
     ];
     if !identity.last_panic.is_empty() {
         rows.push(("last panic".into(), identity.last_panic.to_string()));
+    }
+    if let Err(error) = arm.check_version() {
+        rows.push((
+            "protocol".into(),
+            format!("{error}; until then it is not moved"),
+        ));
+        table::print(&rows);
+        return Ok(());
     }
     for axis in Axis::BOTH {
         let state = if is_uncalibrated(arm, axis)? {
@@ -337,15 +346,19 @@ fn spread(from_deg: f64, to_deg: f64, stands: u16) -> Result<Vec<i32>> {
 }
 
 fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -> Result<()> {
+    let is_person = std::io::stdin().is_terminal();
     let mut lines = std::io::stdin().lock().lines();
     let mut n = 0;
     let mut ask = |arm: &mut Controller, encoder_deg: f64| {
         n += 1;
-        eprint!(
-            "stand {n} of {}: encoder {encoder_deg:.5} deg; reference (deg): ",
-            stands.len()
-        );
-        let _ = std::io::stderr().flush();
+        // Readings from a file need no prompt, and an error is then a line of its own.
+        if is_person {
+            eprint!(
+                "stand {n} of {}: encoder {encoder_deg:.5} deg; reference (deg): ",
+                stands.len()
+            );
+            let _ = std::io::stderr().flush();
+        }
         let line = lines.next().ok_or("the input has ended")?;
         let line = line.map_err(|error| error.to_string())?;
         arm.keep_alive().map_err(|error| error.to_string())?;

@@ -50,6 +50,14 @@ impl Controller {
     /// Says hello and checks that both speak the same protocol. `node` is the controller's address,
     /// or [`NODE_ANY`] for whoever is at the other end.
     pub fn connect(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
+        let controller = Self::connect_for_service(transport, node)?;
+        controller.check_version()?;
+        Ok(controller)
+    }
+
+    /// Says hello, also to firmware of another protocol. What is not always answered is then refused
+    /// here: who it is, its status, its log and stops are left.
+    pub fn connect_for_service(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
         let now_us = transport.now_us();
         let mut controller = Self {
             arm: name_of(node).to_owned(),
@@ -78,6 +86,7 @@ impl Controller {
     pub fn reconnect(&mut self) -> Result<bool, LinkError> {
         let before = self.identity.boot_id;
         self.hello()?;
+        self.check_version()?;
         Ok(self.identity.boot_id != before)
     }
 
@@ -300,6 +309,16 @@ impl Controller {
         let Message::Identity(identity) = answer else {
             return Err(self.confused("hello"));
         };
+        self.identity = identity;
+        Ok(())
+    }
+
+    /// Whether both speak the same protocol.
+    ///
+    /// # Errors
+    /// [`LinkError::Version`]: only who it is, its status, its log and stops can be asked for.
+    pub fn check_version(&self) -> Result<(), LinkError> {
+        let identity = &self.identity;
         let speaks = identity.protocol_min..=identity.protocol_max;
         if !speaks.contains(&PROTOCOL_VERSION) || identity.schema_key != SCHEMA_KEY {
             let [major, minor, patch] = identity.firmware;
@@ -315,7 +334,6 @@ impl Controller {
                 ours: format!("{PROTOCOL_VERSION} schema {SCHEMA_KEY:08x}"),
             });
         }
-        self.identity = identity;
         Ok(())
     }
 
@@ -328,6 +346,9 @@ impl Controller {
 
     /// Sends a request and waits for its answer, repeating it as often as patience allows.
     fn ask(&mut self, message: &Message, what: &'static str) -> Result<(u16, Message), LinkError> {
+        if !Message::is_always_answered(message.kind()) {
+            self.check_version()?;
+        }
         let now_us = self.now_us();
         let Ok((id, frame)) = self.link.begin(message, now_us) else {
             return Err(self.confused(what));

@@ -2,8 +2,6 @@
 
 use std::io;
 
-use gonia_sim::rig::SimPort;
-
 /// A byte stream to one controller, with the clock that belongs to it.
 pub trait Transport: Send {
     /// Sends all bytes.
@@ -15,21 +13,4 @@ pub trait Transport: Send {
 
     /// Now, µs. Never goes back.
     fn now_us(&self) -> u64;
-}
-
-/// Virtual: waiting lets the simulated rig run.
-impl Transport for SimPort {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        SimPort::send(self, bytes);
-        Ok(())
-    }
-
-    fn receive(&mut self, out: &mut Vec<u8>, timeout_us: u64) -> io::Result<()> {
-        SimPort::receive(self, out, timeout_us);
-        Ok(())
-    }
-
-    fn now_us(&self) -> u64 {
-        SimPort::now_us(self)
-    }
 }

@@ -7,6 +7,7 @@ mod charts;
 mod color_map;
 pub mod folder;
 mod html;
+mod motion;
 mod panels;
 pub mod png;
 mod shots;
@@ -15,6 +16,7 @@ mod svg;
 pub mod tone;
 
 pub use folder::report_folder;
+pub use motion::motion_chart;
 
 use crate::dataset::whole_file::write_whole_bytes;
 use crate::dataset::{CellMask, FileError, Summary};

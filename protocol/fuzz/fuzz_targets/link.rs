@@ -23,7 +23,9 @@ fuzz_target!(|deeds: &[u8]| {
             // The host asks for the next thing, if nothing is under way.
             0 if host.poll(now_us) == Wish::Nothing => {
                 asked += 1;
-                let message = Message::Move(Move { target_udeg: [asked, 0] });
+                let message = Message::Move(Move {
+                    target_udeg: [asked, 0],
+                });
                 let (_, frame) = host.begin(&message, now_us).expect("short");
                 to_device.push(FrameBytes::from_slice(frame).expect("short"));
             }

@@ -4,11 +4,12 @@
 
 use gonia_firmware::controller::Controller;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::node::Node;
+use gonia_firmware::node::{Node, identity};
+use gonia_firmware::steps::{End, Period, Progress};
+use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::frame::encode;
-use gonia_protocol::message::{Hello, Identity, Message, Move, ResetReason, Setting, State};
+use gonia_protocol::message::{Hello, Message, Move, ResetReason, Setting, State};
 use gonia_protocol::settings::Axis;
-use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 use libfuzzer_sys::fuzz_target;
 
 #[derive(Default)]
@@ -18,9 +19,17 @@ struct Pins {
 }
 
 impl Hardware for Pins {
-    fn step(&mut self, _: Axis, _: bool, _: u64) {
-        self.steps += 1;
+    fn queue_step(&mut self, _: Axis, period: Period) {
+        self.steps += u64::from(period.end() == End::Step);
     }
+    fn progress(&mut self, _: Axis) -> Progress {
+        Progress {
+            given: self.steps as i32,
+            waiting: usize::from(self.sensors >> 1),
+            is_playing: self.sensors & 0x80 != 0,
+        }
+    }
+    fn halt(&mut self, _: Axis) {}
     fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
         match self.sensors & 3 {
             0 => Err(EncoderLost),
@@ -37,23 +46,16 @@ impl Hardware for Pins {
     fn hold_interlock_open(&mut self, _: bool) {}
     fn set_trigger(&mut self, _: bool) {}
     fn save_settings(&mut self, _: &[u8]) -> Result<(), NotSaved> {
-        if self.sensors & 0x40 == 0 { Ok(()) } else { Err(NotSaved) }
+        if self.sensors & 0x40 == 0 {
+            Ok(())
+        } else {
+            Err(NotSaved)
+        }
     }
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    let identity = Identity {
-        protocol_min: PROTOCOL_VERSION,
-        protocol_max: PROTOCOL_VERSION,
-        schema_key: SCHEMA_KEY,
-        firmware: [0; 3],
-        git: Default::default(),
-        board: Default::default(),
-        config_crc: 0,
-        boot_id: 0,
-        reset: ResetReason::Unknown,
-        last_panic: Default::default(),
-    };
+    let identity = identity("fuzz", 0, ResetReason::Unknown, "");
     let mut pins = Pins::default();
     let mut node = Node::new(NODE_LIGHT, identity, Controller::new(0, None));
     let (mut now_us, mut request) = (0u64, 0u16);
@@ -66,9 +68,13 @@ fuzz_target!(|bytes: &[u8]| {
         }
         let value = i32::from_le_bytes(word);
         let message = match deed % 16 {
-            0 => Message::Hello(Hello { session: value as u32 }),
+            0 => Message::Hello(Hello {
+                session: value as u32,
+            }),
             1 => Message::Home,
-            2 => Message::Move(Move { target_udeg: [value % 100_000_000, value] }),
+            2 => Message::Move(Move {
+                target_udeg: [value % 100_000_000, value],
+            }),
             3 => Message::Fire,
             4 => Message::Stop,
             5 => Message::EStop,

@@ -12,7 +12,9 @@
 #![no_std]
 #![no_main]
 
+mod arm;
 mod register;
+mod steps;
 mod time;
 mod uart;
 
@@ -23,21 +25,23 @@ use embassy_executor::Spawner;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Instant, Timer};
 use gonia_firmware::controller::Controller;
-use gonia_firmware::node::Node;
+use gonia_firmware::node::{Node, identity};
+use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::message::{Identity, ResetReason};
-use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 use gonia_sim::bench::Bench;
-use gonia_sim::plant::PlantConfig;
 use panic_persist as _;
 use static_cell::StaticCell;
+
+use crate::arm::EmulatedArm;
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     static LOG_PORT: StaticCell<uart::LogPort> = StaticCell::new();
     time::start();
     uart::start();
+    steps::start();
     defmt_serial::defmt_serial(LOG_PORT.init(uart::LogPort));
-    for irq in [time::IRQ, uart::RX_IRQ] {
+    for irq in [time::IRQ, steps::IRQ, uart::RX_IRQ] {
         // SAFETY: the handlers share data with tasks only through critical sections.
         unsafe { NVIC::unmask(Irq(irq)) };
     }
@@ -51,50 +55,40 @@ async fn main(spawner: Spawner) {
 #[embassy_executor::task]
 async fn run_arm() {
     static NODE: StaticCell<Node> = StaticCell::new();
-    static BENCH: StaticCell<Bench> = StaticCell::new();
+    static ARM: StaticCell<EmulatedArm> = StaticCell::new();
     let controller = Controller::new(now_us(), None);
-    let node = NODE.init(Node::new(NODE_LIGHT, identity(), controller));
-    // Not far above the home switches, so that homing takes seconds.
-    let axes = [(-5e6, 3e6), (-190e6, -170e6)];
-    let axes = axes.map(|(home, start)| PlantConfig::worm_axis(home, start));
-    let bench = BENCH.init(Bench::new(axes, 1));
+    let node = NODE.init(Node::new(NODE_LIGHT, who_it_is(), controller));
+    let arm = ARM.init(EmulatedArm(Bench::quiet_arm_near_home()));
     defmt::info!("ready");
     let mut bytes = [0; 64];
     loop {
-        bench.set_now(now_us());
-        node.poll(now_us(), bench);
+        arm.set_now(now_us());
+        node.poll(now_us(), arm);
         while let Some(frame) = node.take_frame() {
             uart::WIRE.send(&frame);
         }
         let wake = Timer::at(Instant::from_micros(node.wake_us()));
         if let Either::First(received) = select(uart::RECEIVED.read(&mut bytes), wake).await {
-            bench.set_now(now_us());
+            arm.set_now(now_us());
             for &byte in &bytes[..received] {
-                node.receive(byte, now_us(), bench);
+                node.receive(byte, now_us(), arm);
             }
         }
     }
 }
 
-fn identity() -> Identity {
+fn who_it_is() -> Identity {
     let last_panic = panic_persist::get_panic_message_utf8();
     let reset = match last_panic {
         Some(_) => ResetReason::Software,
         None => ResetReason::Unknown,
     };
-    let last_panic = last_panic.unwrap_or_default();
-    Identity {
-        protocol_min: PROTOCOL_VERSION,
-        protocol_max: PROTOCOL_VERSION,
-        schema_key: SCHEMA_KEY,
-        firmware: gonia_firmware::VERSION,
-        git: gonia_firmware::git_state(),
-        board: "qemu-mps2".try_into().unwrap_or_default(),
-        config_crc: 0,
-        boot_id: next_boot_id(),
+    identity(
+        "qemu-mps2",
+        next_boot_id(),
         reset,
-        last_panic: last_panic.chars().filter(char::is_ascii).take(64).collect(),
-    }
+        last_panic.unwrap_or_default(),
+    )
 }
 
 /// Counts starts since power came on, in memory that a reset leaves alone.
@@ -128,6 +122,7 @@ unsafe impl InterruptNumber for Irq {
 #[exception]
 unsafe fn DefaultHandler(irq: i16) {
     match irq as u16 {
+        steps::IRQ => steps::on_period(),
         time::IRQ => time::on_alarm(),
         uart::RX_IRQ => uart::on_receive(),
         _ => {}

@@ -1,24 +1,22 @@
 //! Everything that one arm's controller is wired to.
 
 use embassy_stm32::gpio::{Input, Output};
-use embassy_time::Delay;
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::Spi;
+use embassy_stm32::spi::mode::Master;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::pins::StepDir;
+use gonia_firmware::ssi::SsiEncoder;
+use gonia_firmware::steps::{Period, Progress};
 use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
-use crate::encoder::Encoder;
 use crate::sectors::FlashSectors;
+use crate::{now_us, steps};
 
-/// A driver's pins.
-pub type Driver = StepDir<Output<'static>, Output<'static>, Delay>;
-
-/// Pins, encoders and memory. Pairs are θ and φ.
+/// Pins, encoders and memory; the drivers are with the step timers. Pairs are θ and φ.
 pub struct ArmPins {
-    /// Step and direction.
-    pub drivers: [Driver; 2],
     /// The shafts.
-    pub encoders: [Encoder; 2],
+    pub encoders: [SsiEncoder<Spi<'static, Blocking, Master>>; 2],
     /// To ground when closed.
     pub home_switches: [Input<'static>; 2],
     /// To ground while the chain is closed, so that a cut wire stops the arm.
@@ -34,13 +32,20 @@ pub struct ArmPins {
 }
 
 impl Hardware for ArmPins {
-    fn step(&mut self, axis: Axis, forward: bool, _due_us: u64) {
-        // The pins of this chip cannot fail.
-        let _ = self.drivers[axis.index()].step(forward);
+    fn queue_step(&mut self, axis: Axis, period: Period) {
+        steps::queue(axis, period);
+    }
+
+    fn progress(&mut self, axis: Axis) -> Progress {
+        steps::progress(axis)
+    }
+
+    fn halt(&mut self, axis: Axis) {
+        steps::halt(axis);
     }
 
     fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
-        self.encoders[axis.index()].counts()
+        self.encoders[axis.index()].counts(now_us())
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {

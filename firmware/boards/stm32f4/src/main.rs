@@ -5,8 +5,8 @@
 //! | function | pin | Nucleo |
 //! |---|---|---|
 //! | wire to the host: USART2, 921,600 baud, through the ST-Link's USB | PA2, PA3 | – |
-//! | θ: step, direction | PA8, PA9 | D7, D8 |
-//! | φ: step, direction | PB10, PB4 | D6, D5 |
+//! | θ: step (TIM5), direction | PA0, PA9 | A0, D8 |
+//! | φ: step (TIM2), direction | PB10, PB4 | D6, D5 |
 //! | θ encoder (SSI): clock, data | PA5, PA6 | D13, D12 |
 //! | φ encoder (SSI): clock, data | PB13, PB14 | CN10-30, CN10-28 |
 //! | home switches θ, φ (to ground when closed) | PC0, PC1 | A5, A4 |
@@ -19,8 +19,8 @@
 #![no_main]
 
 mod arm;
-mod encoder;
 mod sectors;
+mod steps;
 
 use cortex_m::singleton;
 use defmt_rtt as _;
@@ -28,31 +28,33 @@ use embassy_executor::Spawner;
 use embassy_futures::select::{Either3, select3};
 use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::flash::Flash;
-use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{TIM2, TIM5};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
-use embassy_stm32::spi::Spi;
+use embassy_stm32::spi::{self, MODE_2, Spi};
 use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_stm32::timer::{Ch1, Ch3};
 use embassy_stm32::usart::{BufferedUart, Config as UartConfig};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, bind_interrupts, exti, interrupt, pac, peripherals, usart};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Delay, Instant, Timer};
+use embassy_time::{Instant, Timer};
 use embedded_io_async::{Read, Write};
 use gonia_firmware::controller::Controller;
-use gonia_firmware::node::Node;
-use gonia_firmware::pins::StepDir;
+use gonia_firmware::node::{Node, identity};
+use gonia_firmware::ssi::SsiEncoder;
 use gonia_firmware::store::Store;
-use gonia_protocol::message::{Identity, ResetReason};
-use gonia_protocol::{NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+use gonia_protocol::message::ResetReason;
+use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 use panic_persist as _;
 use static_cell::StaticCell;
 
-use crate::arm::{ArmPins, Driver};
-use crate::encoder::Encoder;
+use crate::arm::ArmPins;
 use crate::sectors::FlashSectors;
 
 bind_interrupts!(struct Interrupts {
@@ -66,8 +68,6 @@ static TRIGGERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 const BAUD: u32 = 921_600;
 /// Longer than erasing a sector of flash takes.
 const WATCHDOG_US: u32 = 8_000_000;
-/// What optocoupled drivers need between edges.
-const STEP_PULSE_NS: u32 = 2_500;
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -82,14 +82,14 @@ async fn main(spawner: Spawner) {
         true => NODE_CAMERA,
         false => NODE_LIGHT,
     };
-    let theta = Spi::new_blocking_rxonly(p.SPI1, p.PA5, p.PA6, Encoder::config());
-    let phi = Spi::new_blocking_rxonly(p.SPI2, p.PB13, p.PB14, Encoder::config());
+    let theta = Spi::new_blocking_rxonly(p.SPI1, p.PA5, p.PA6, ssi_config());
+    let phi = Spi::new_blocking_rxonly(p.SPI2, p.PB13, p.PB14, ssi_config());
+    // A dropped pin goes back to an input: these stay with their timers.
+    core::mem::forget(PwmPin::<TIM5, Ch1>::new(p.PA0, OutputType::PushPull));
+    core::mem::forget(PwmPin::<TIM2, Ch3>::new(p.PB10, OutputType::PushPull));
+    steps::start([output(p.PA9.into()), output(p.PB4.into())]);
     let mut pins = ArmPins {
-        drivers: [
-            driver(output(p.PA8.into()), output(p.PA9.into())),
-            driver(output(p.PB10.into()), output(p.PB4.into())),
-        ],
-        encoders: [Encoder::new(theta), Encoder::new(phi)],
+        encoders: [SsiEncoder::new(theta), SsiEncoder::new(phi)],
         home_switches: [switch(p.PC0.into()), switch(p.PC1.into())],
         interlock: switch(p.PC2.into()),
         interlock_relay: output(p.PC3.into()),
@@ -119,7 +119,9 @@ async fn main(spawner: Spawner) {
 
     static NODE: StaticCell<Node> = StaticCell::new();
     let controller = Controller::new(now_us(), settings.as_deref());
-    let node = NODE.init(Node::new(address, identity(reset), controller));
+    let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
+    let identity = identity("stm32f4", next_boot_id(), reset, last_panic);
+    let node = NODE.init(Node::new(address, identity, controller));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
     defmt::info!("ready, address {}", address);
@@ -157,8 +159,12 @@ async fn watch_trigger(mut pin: ExtiInput<'static, Async>) {
     }
 }
 
-fn driver(step: Output<'static>, direction: Output<'static>) -> Driver {
-    StepDir::new(step, direction, Delay, STEP_PULSE_NS)
+/// SPI settings that speak SSI at 1 MHz, which 50 m of cable allow.
+fn ssi_config() -> spi::Config {
+    let mut config = spi::Config::default();
+    config.mode = MODE_2;
+    config.frequency = Hertz(1_000_000);
+    config
 }
 
 /// 168 MHz from the 8 MHz that the ST-Link provides.
@@ -200,22 +206,6 @@ fn take_reset_reason() -> ResetReason {
         ResetReason::Pin
     } else {
         ResetReason::Unknown
-    }
-}
-
-fn identity(reset: ResetReason) -> Identity {
-    let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
-    Identity {
-        protocol_min: PROTOCOL_VERSION,
-        protocol_max: PROTOCOL_VERSION,
-        schema_key: SCHEMA_KEY,
-        firmware: gonia_firmware::VERSION,
-        git: gonia_firmware::git_state(),
-        board: "stm32f4".try_into().unwrap_or_default(),
-        config_crc: 0,
-        boot_id: next_boot_id(),
-        reset,
-        last_panic: last_panic.chars().filter(char::is_ascii).take(64).collect(),
     }
 }
 

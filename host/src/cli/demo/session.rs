@@ -57,6 +57,9 @@ pub fn measure(
         Box::new(rig.port(Arm::Light)),
         Box::new(rig.port(Arm::Camera)),
     )?;
+    if let Some(warning) = arms.calibration_warning()? {
+        eprintln!("warning: {warning}");
+    }
     let mut session = Session {
         kept: 0,
         refused: BTreeMap::new(),

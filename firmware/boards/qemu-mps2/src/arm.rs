@@ -1,0 +1,59 @@
+//! The arm: real step timers in front of the simulator's motors, its encoders and switches behind.
+
+use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::steps::{Period, Progress};
+use gonia_protocol::settings::Axis;
+use gonia_sim::bench::Bench;
+
+use crate::steps;
+
+/// The simulated arm, with the board's timers for its own.
+pub struct EmulatedArm(pub Bench);
+
+impl EmulatedArm {
+    /// The time at which the firmware looks at its pins: steps given by then have moved the motors.
+    pub fn set_now(&mut self, now_us: u64) {
+        while let Some(given) = steps::take_given() {
+            self.0.axis(given.axis).step(given.up, given.at_us);
+        }
+        self.0.set_now(now_us);
+    }
+}
+
+impl Hardware for EmulatedArm {
+    fn queue_step(&mut self, axis: Axis, period: Period) {
+        steps::queue(axis, period);
+    }
+
+    fn progress(&mut self, axis: Axis) -> Progress {
+        steps::progress(axis)
+    }
+
+    fn halt(&mut self, axis: Axis) {
+        steps::halt(axis);
+    }
+
+    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
+        self.0.encoder_counts(axis)
+    }
+
+    fn home_switch_closed(&mut self, axis: Axis) -> bool {
+        self.0.home_switch_closed(axis)
+    }
+
+    fn interlock_closed(&mut self) -> bool {
+        self.0.interlock_closed()
+    }
+
+    fn hold_interlock_open(&mut self, open: bool) {
+        self.0.hold_interlock_open(open);
+    }
+
+    fn set_trigger(&mut self, on: bool) {
+        self.0.set_trigger(on);
+    }
+
+    fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
+        self.0.save_settings(bytes)
+    }
+}

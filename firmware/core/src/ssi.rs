@@ -1,0 +1,127 @@
+//! An 18-bit absolute ring encoder with SSI: clock and data over RS-422, read by an SPI.
+//!
+//! The data line rests high. The first falling edge of the clock latches the position; each rising
+//! edge puts out a bit, most significant first, which is read at the falling edge after it (SPI
+//! mode 2). So 24 clocks bring one high bit, 18 bits of position, the error bit (low: the position is
+//! not valid), the warning bit, and three that say nothing. RLS AksIM-2 rings ordered with SSI are of
+//! this kind; compare with the data sheet of yours.
+
+use embedded_hal::spi::SpiBus;
+
+use crate::hardware::EncoderLost;
+
+/// The encoder needs this long after a frame before it latches anew, µs.
+const PAUSE_US: u64 = 50;
+
+/// One encoder on its SPI.
+#[derive(Debug)]
+pub struct SsiEncoder<S> {
+    spi: S,
+    last: Result<u32, EncoderLost>,
+    read_us: Option<u64>,
+}
+
+impl<S: SpiBus> SsiEncoder<S> {
+    /// An encoder that has not been read.
+    pub const fn new(spi: S) -> Self {
+        Self {
+            spi,
+            last: Err(EncoderLost),
+            read_us: None,
+        }
+    }
+
+    /// The position in counts. Within the encoder's pause the last one, which is not older than it.
+    pub fn counts(&mut self, now_us: u64) -> Result<u32, EncoderLost> {
+        if self.read_us.is_none_or(|at| now_us >= at + PAUSE_US) {
+            let mut frame = [0u8; 3];
+            let read = self.spi.read(&mut frame);
+            self.last = read.map_err(|_| EncoderLost).and_then(|()| decode(frame));
+            self.read_us = Some(now_us);
+        }
+        self.last
+    }
+}
+
+/// A line that is cut or shorted reads all ones or all zeros, and neither is a position.
+fn decode(frame: [u8; 3]) -> Result<u32, EncoderLost> {
+    let [a, b, c] = frame.map(u32::from);
+    let bits = a << 16 | b << 8 | c;
+    let (rest, valid) = (bits >> 23 & 1, bits >> 4 & 1);
+    if rest == 0 || valid == 0 || bits == 0xFF_FFFF {
+        return Err(EncoderLost);
+    }
+    Ok(bits >> 5 & 0x3_FFFF)
+}
+
+#[cfg(test)]
+mod tests {
+    use core::convert::Infallible;
+
+    use embedded_hal::spi::ErrorType;
+
+    use super::*;
+
+    /// Answers with frames one after the other.
+    struct Line<'a>(&'a [u32]);
+
+    impl ErrorType for Line<'_> {
+        type Error = Infallible;
+    }
+
+    impl SpiBus for Line<'_> {
+        fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
+            let (frame, rest) = self.0.split_first().unwrap();
+            self.0 = rest;
+            words.copy_from_slice(&frame.to_be_bytes()[1..]);
+            Ok(())
+        }
+        fn write(&mut self, _: &[u8]) -> Result<(), Infallible> {
+            Ok(())
+        }
+        fn transfer(&mut self, _: &mut [u8], _: &[u8]) -> Result<(), Infallible> {
+            Ok(())
+        }
+        fn transfer_in_place(&mut self, _: &mut [u8]) -> Result<(), Infallible> {
+            Ok(())
+        }
+        fn flush(&mut self) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    fn encoder(frames: &[u32]) -> SsiEncoder<Line<'_>> {
+        SsiEncoder::new(Line(frames))
+    }
+
+    #[test]
+    fn a_position_is_told_from_a_bad_one_and_from_no_encoder() {
+        let good = |counts: u32| 1 << 23 | counts << 5 | 1 << 4;
+        let frames = [
+            good(0),
+            good(0x2_5A5A),
+            good(0x3_FFFF),
+            good(77) & !(1 << 4),
+            0,
+            0xFF_FFFF,
+        ];
+        let mut encoder = encoder(&frames);
+        let readings = [0, 1, 2, 3, 4, 5].map(|i| encoder.counts(i * 1000));
+        let lost = Err(EncoderLost);
+        assert_eq!(
+            readings,
+            [Ok(0), Ok(0x2_5A5A), Ok(0x3_FFFF), lost, lost, lost]
+        );
+    }
+
+    #[test]
+    fn within_its_pause_the_encoder_is_left_alone() {
+        let frame = |counts: u32| 1 << 23 | counts << 5 | 1 << 4;
+        let frames = [frame(5), frame(6)];
+        let mut encoder = encoder(&frames);
+        assert_eq!(
+            [100, 149, 150].map(|at| encoder.counts(at)),
+            [Ok(5), Ok(5), Ok(6)]
+        );
+    }
+}
