@@ -135,7 +135,7 @@ impl SharedPlanes {
 }
 
 /// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
-fn spread_poles(grid: Grid, plane: &mut [f32]) {
+pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
     let (n, n_phi) = (grid.n_directions(), grid.n_phi());
     for row in plane.chunks_exact_mut(n) {
         let pole = row[0];
