@@ -1,6 +1,7 @@
 //! The command line. Each command is one file; all end with exit code 0, with 1 after one line
 //! that says what is wrong and what to do, or with 2 for wrong usage.
 
+mod chart;
 mod compare;
 mod demo;
 mod device;
@@ -42,6 +43,8 @@ enum Command {
     Query(query::Query),
     /// How far one dense BRDF is from another, by stratum
     Compare(compare::Compare),
+    /// What every interpolation method costs, and how far it is off
+    Chart(chart::Chart),
     /// One HTML file with pictures and figures of a measurement
     Report(report::Report),
     /// Talk to the controller of an arm: identify, home, move, settings, calibration
@@ -75,6 +78,7 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Fill(command) => command.run(),
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),
+        Command::Chart(command) => command.run(),
         Command::Report(command) => command.run(),
         Command::Device(command) => command.run(),
         Command::SimDevice(command) => command.run(),

@@ -4,6 +4,7 @@
 //! cylinder that the image differences (and the report's pictures) are made of.
 
 mod accumulate;
+pub mod chart;
 pub mod color;
 pub mod compare;
 pub mod figures;

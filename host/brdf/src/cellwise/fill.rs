@@ -33,18 +33,11 @@ pub fn fill(
     settings: &CellSettings,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<CellFill, FillError> {
-    let predictor = Predictor::new(bins, settings)?;
+    let filler = CellFiller::new(bins, settings)?;
     let grid = bins.grid();
     let n = grid.n_directions();
     let mut planes = [(); 3].map(|()| vec![0f32; grid.n_cells()]);
     let [red, green, blue] = &mut planes;
-    let filler = Filler {
-        predictor: &predictor,
-        bins,
-        grid,
-        failed: AtomicU64::new(0),
-        raised: AtomicU64::new(0),
-    };
     let done = AtomicUsize::new(0);
     red.par_chunks_mut(n)
         .zip(green.par_chunks_mut(n))
@@ -65,10 +58,11 @@ pub fn fill(
         mirror(n, plane);
         spread_poles(grid, plane);
     }
+    let tally = filler.tally();
     Ok(CellFill {
         dense: DenseBrdf::from_planes(grid, planes),
-        failed: filler.failed.into_inner(),
-        raised: filler.raised.into_inner(),
+        failed: tally.failed,
+        raised: tally.raised,
     })
 }
 
@@ -102,19 +96,56 @@ fn bin_at(bins: &Bins, cell: usize) -> Option<[f32; 3]> {
     Some(bins.bins()[found].median)
 }
 
-struct Filler<'a> {
-    predictor: &'a Predictor<'a>,
+/// Gives single cells the values that [`fill()`] gives them.
+pub struct CellFiller<'a> {
+    predictor: Predictor<'a>,
     bins: &'a Bins,
-    grid: Grid,
+    interpolated: AtomicU64,
     failed: AtomicU64,
     raised: AtomicU64,
 }
 
-impl Filler<'_> {
-    /// The value of a cell and of its mirror.
-    fn pair(&self, light: usize, view: usize, work: &mut Workspace) -> [f32; 3] {
-        let one = bin_at(self.bins, self.grid.cell(light, view));
-        let other = bin_at(self.bins, self.grid.cell(view, light));
+/// What a [`CellFiller`] has done so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tally {
+    /// Interpolations; a cell without a bin and its mirror take two, or one if `mirrored`.
+    pub interpolated: u64,
+    /// Those that failed, and were replaced by the nearest bin's value.
+    pub failed: u64,
+    /// Values (cells times channels) raised because they were not positive.
+    pub raised: u64,
+}
+
+impl<'a> CellFiller<'a> {
+    /// Makes the bins ready.
+    ///
+    /// # Errors
+    /// Too few bins.
+    pub fn new(bins: &'a Bins, settings: &CellSettings) -> Result<Self, FillError> {
+        Ok(Self {
+            predictor: Predictor::new(bins, settings)?,
+            bins,
+            interpolated: AtomicU64::new(0),
+            failed: AtomicU64::new(0),
+            raised: AtomicU64::new(0),
+        })
+    }
+
+    /// What was done so far.
+    pub fn tally(&self) -> Tally {
+        Tally {
+            interpolated: self.interpolated.load(Relaxed),
+            failed: self.failed.load(Relaxed),
+            raised: self.raised.load(Relaxed),
+        }
+    }
+
+    /// The value of a pair of direction indices, in either order. Of a pole only azimuth 0 is known
+    /// by its bin.
+    pub fn pair(&self, light: usize, view: usize, work: &mut Workspace) -> [f32; 3] {
+        let grid = self.bins.grid();
+        let one = bin_at(self.bins, grid.cell(light, view));
+        let other = bin_at(self.bins, grid.cell(view, light));
         let value = if light == view {
             one.unwrap_or_else(|| self.interpolated(light, view, work))
         } else if self.predictor.settings().mirrored {
@@ -129,19 +160,21 @@ impl Filler<'_> {
                 other.unwrap_or_else(|| self.interpolated(view, light, work)),
             )
         };
-        let floor = self.predictor.floor();
         let negative = value.iter().filter(|v| **v <= 0.0).count() as u64;
         if negative == 0 {
             return value;
         }
         self.raised.fetch_add(negative, Relaxed);
+        let floor = self.predictor.floor();
         [0, 1, 2].map(|c| if value[c] > 0.0 { value[c] } else { floor[c] })
     }
 
     fn interpolated(&self, light: usize, view: usize, work: &mut Workspace) -> [f32; 3] {
+        self.interpolated.fetch_add(1, Relaxed);
+        let grid = self.bins.grid();
         let (light, view) = (
-            self.grid.direction(light).to_vec3(),
-            self.grid.direction(view).to_vec3(),
+            grid.direction(light).to_vec3(),
+            grid.direction(view).to_vec3(),
         );
         let value = self.predictor.at(light, view, work).unwrap_or_else(|_| {
             self.failed.fetch_add(1, Relaxed);

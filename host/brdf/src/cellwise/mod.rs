@@ -22,7 +22,7 @@ mod shepard;
 mod space;
 mod system;
 
-pub use fill::{CellFill, fill, n_interpolated};
+pub use fill::{CellFill, CellFiller, Tally, fill, n_interpolated};
 pub use kernel::Kernel;
 pub use neighbours::Neighbourhood;
 pub use predict::{Predictor, Workspace};

@@ -1,0 +1,82 @@
+//! What the benches measure: analytic materials, seen by the paper's plan on the paper's rig.
+
+use gonia_brdf::direction::local_direction;
+use gonia_brdf::hemisphere::{paper_lights, paper_views};
+use gonia_brdf::model::{Kurt, KurtLobe};
+use gonia_brdf::{Brdf, Direction, Sample};
+use rayon::prelude::*;
+
+/// Standard deviation of the noise, relative.
+pub const NOISE: f64 = 0.015;
+
+pub fn material(name: &str) -> Box<dyn Brdf> {
+    let lobe = |specular: f64, mx, my| KurtLobe {
+        specular: [specular, 0.8 * specular, 0.6 * specular],
+        f0: 0.05,
+        mx,
+        my,
+        alpha: 0.3,
+        azimuth_deg: 31.0,
+    };
+    Box::new(match name {
+        "matte" => Kurt::white_reference_fabric(),
+        "broad" => Kurt::new([0.2, 0.15, 0.1], &[lobe(2.0, 0.15, 0.4)]),
+        "sharp" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.05, 0.3)]),
+        "sharper" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.03, 0.12)]),
+        _ => Kurt::two_thread_fabric(),
+    })
+}
+
+/// The paper's plan on the paper's rig: 8505 frames of 1225 points, with noise.
+pub fn measure(model: &dyn Brdf) -> Vec<Sample> {
+    let (lights, views) = (paper_lights(), paper_views());
+    let points: Vec<[f64; 2]> = (-19..=19)
+        .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
+        .filter(|p| p[0].hypot(p[1]) <= 0.277)
+        .collect();
+    (0..lights.len() * views.len())
+        .into_par_iter()
+        .flat_map_iter(|frame| {
+            let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
+            let points = &points;
+            points.iter().enumerate().map(move |(k, point)| {
+                let l = local_direction(light, 1.1, *point);
+                let v = local_direction(view, 1.8, *point);
+                let value = model.eval(l, v);
+                let noise = [0, 1, 2].map(|c| 1.0 + NOISE * normal((frame * 1225 + k) * 3 + c));
+                let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
+                Sample {
+                    theta_i_deg: l.theta_deg() as f32,
+                    phi_i_deg: l.phi_deg() as f32,
+                    theta_v_deg: v.theta_deg() as f32,
+                    phi_v_deg: v.phi_deg() as f32,
+                    rgb: [0, 1, 2].map(|c| (value[c] * noise[c]) as f32),
+                    frame: frame as u32,
+                }
+            })
+        })
+        .collect()
+}
+
+/// A nearly normal number from a counter: the sum of four uniform ones.
+fn normal(counter: usize) -> f64 {
+    let mut x = (counter as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d;
+    x ^= x >> 31;
+    x = x.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x ^= x >> 28;
+    let sum: f64 = (0..4).map(|k| f64::from((x >> (16 * k)) as u16)).sum();
+    (sum / 65536.0 - 2.0) * 3f64.sqrt()
+}
+
+/// CPU seconds of all threads of this process so far.
+pub fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = stat.rsplit(')').next().unwrap_or_default();
+    let field = |k: usize| {
+        after_name
+            .split_whitespace()
+            .nth(k)
+            .and_then(|f| f.parse::<f64>().ok())
+    };
+    (field(11).unwrap_or(f64::NAN) + field(12).unwrap_or(f64::NAN)) / 100.0
+}
