@@ -12,7 +12,6 @@ use crate::evaluate::chart::{
 };
 use crate::report::frontier;
 use anyhow::{Context, Result, bail};
-use gonia_brdf::cellwise::CellSettings;
 use gonia_brdf::{Bins, Grid, Sample};
 use std::path::{Path, PathBuf};
 
@@ -39,9 +38,9 @@ pub struct Chart {
     /// Cells (or bins held out) that are tested
     #[arg(long, default_value_t = 2000, value_name = "N")]
     tests: usize,
-    /// Chart this method cell by cell instead of the standard ones; again for more
+    /// Chart this method instead of the standard ones; again for more. Names are as in methods.csv
     #[arg(long = "method", value_name = "NAME")]
-    methods: Vec<CellSettings>,
+    methods: Vec<Contender>,
     /// Leave out one of the two charts
     #[arg(long, value_enum, value_name = "CHART")]
     only: Option<Only>,
@@ -120,8 +119,7 @@ impl Chart {
         if self.methods.is_empty() {
             return standard(grid);
         }
-        let methods = self.methods.iter().copied();
-        methods.map(Contender::Cellwise).collect()
+        self.methods.clone()
     }
 
     fn write(&self, name: &str, points: &[Point], svg: &str) -> Result<()> {

@@ -24,6 +24,16 @@ pub struct Workspace {
     pub system: System,
 }
 
+impl Workspace {
+    /// One whose system estimates its condition number.
+    pub fn measuring_condition() -> Self {
+        Self {
+            near: Neighbourhood::default(),
+            system: System::measuring_condition(),
+        }
+    }
+}
+
 /// Logarithms are cut off here: e^±60 is far beyond any BRDF and far within single precision.
 const LOG_LIMIT: f64 = 60.0;
 

@@ -1,11 +1,14 @@
 //! The methods that are compared.
 
 use super::cpu::cpu_seconds;
-use gonia_brdf::cellwise::{CellFiller, CellSettings, Rule, Workspace, n_interpolated};
+use gonia_brdf::cellwise::{
+    CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
+};
 use gonia_brdf::interpolate::{self, FillError, Settings};
 use gonia_brdf::{Bins, Grid};
 use rayon::prelude::*;
 use std::fmt;
+use std::str::FromStr;
 
 /// A method with its settings.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,14 +67,14 @@ pub(super) struct Run {
     pub failed: f64,
 }
 
-/// Blocks: size in degrees, and nodes.
-const BLOCKS: [(f64, usize); 6] = [
-    (12.0, 128),
-    (8.0, 128),
-    (8.0, 256),
-    (6.0, 128),
-    (4.0, 64),
-    (4.0, 128),
+/// Block settings, by name.
+const BLOCKS: [&str; 6] = [
+    "blocks=12,nodes=128",
+    "blocks=8,nodes=128",
+    "blocks=8,nodes=256",
+    "blocks=6,nodes=128",
+    "blocks=4,nodes=64",
+    "blocks=4,nodes=128",
 ];
 
 /// Methods that work cell by cell, by name.
@@ -104,28 +107,19 @@ const CELLWISE: [&str; 26] = [
     "mls2,half=0.5,log,means,mirrored",
 ];
 
-/// What is compared when nothing else is said.
+/// What is compared when nothing else is said: the default first, and no block smaller than a step
+/// of the grid.
 pub fn standard(grid: Grid) -> Vec<Contender> {
     let default = Contender::default_of(grid);
-    let blocks = BLOCKS
-        .into_iter()
-        .filter(|(patch_deg, _)| *patch_deg >= grid.step_deg())
-        .map(|(patch_deg, nodes)| {
-            Contender::Blocks(Settings {
-                patch_deg,
-                nodes,
-                ..Settings::DEFAULT
-            })
-        });
-    let mut all: Vec<Contender> = vec![default.clone()];
-    all.extend(blocks.filter(|block| *block != default));
-    all.extend(
-        CELLWISE
-            .iter()
-            .filter_map(|name| name.parse().ok())
-            .map(Contender::Cellwise),
-    );
-    all
+    let others = BLOCKS.iter().chain(&CELLWISE);
+    let others = others.filter_map(|name| name.parse::<Contender>().ok());
+    let fits = |contender: &Contender| match contender {
+        Contender::Blocks(settings) => settings.patch_deg >= grid.step_deg(),
+        Contender::Cellwise(_) => true,
+    };
+    std::iter::once(default.clone())
+        .chain(others.filter(|other| *other != default && fits(other)))
+        .collect()
 }
 
 impl Contender {
@@ -216,9 +210,28 @@ impl fmt::Display for Contender {
         match self {
             Contender::Cellwise(settings) => settings.fmt(f),
             Contender::Blocks(settings) => {
-                write!(f, "blocks of {}°, {}", settings.patch_deg, settings.nodes)
+                write!(f, "blocks={},nodes={}", settings.patch_deg, settings.nodes)
             }
         }
+    }
+}
+
+impl FromStr for Contender {
+    type Err = SettingsError;
+
+    /// `blocks=DEGREES,nodes=N`, or the name of a method that works cell by cell.
+    fn from_str(text: &str) -> Result<Self, SettingsError> {
+        let blocks = || {
+            let (patch, nodes) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
+            let patch_deg = patch.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
+            let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
+            Some(Contender::Blocks(Settings {
+                patch_deg,
+                nodes,
+                ..Settings::DEFAULT
+            }))
+        };
+        blocks().map_or_else(|| text.parse().map(Contender::Cellwise), Ok)
     }
 }
 
@@ -235,6 +248,9 @@ mod tests {
             let mut names: Vec<String> = all.iter().map(|c| c.to_string()).collect();
             assert_eq!(names[names.len() - CELLWISE.len()], "paper");
             assert!(CELLWISE.iter().all(|name| names.contains(&(*name).into())));
+            for (name, contender) in names.iter().zip(&all) {
+                assert_eq!(name.parse().as_ref(), Ok(contender));
+            }
             names.sort();
             names.dedup();
             assert_eq!(names.len(), all.len());

@@ -12,8 +12,8 @@ use gonia_brdf::{Bins, Brdf, Direction, Grid};
 use std::collections::{HashMap, HashSet};
 use std::sync::Mutex;
 
-/// Side of the rendered sphere, pixels: about 1200 cells.
-const SPHERE_PX: usize = 48;
+/// Side of the rendered sphere, pixels: every one of its 500 lit ones is a cell to interpolate.
+const SPHERE_PX: usize = 32;
 /// Cells that limits and levels are taken from.
 const SCAN_CELLS: usize = 200_000;
 
