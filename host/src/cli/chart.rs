@@ -77,8 +77,12 @@ impl Chart {
                 chart::methods(&bins, frames, &contenders, &judge, tell)
             })?;
             print_points(&points);
-            let title = title(path, "error against cost", &judge);
-            self.write("methods", &points, &frontier::methods(&points, &title))?;
+            let title = title(path, "error against cost");
+            self.write(
+                "methods",
+                &points,
+                &frontier::methods(&points, &title, judge.basis()),
+            )?;
         }
         if self.only != Some(Only::Methods) {
             let contenders = [Contender::default_of(grid), Contender::paper()];
@@ -86,8 +90,12 @@ impl Chart {
                 chart::images(&Subset::all_of(&samples), &contenders, &judge, tell)
             })?;
             print_points(&points);
-            let title = title(path, "error against images", &judge);
-            self.write("images", &points, &frontier::images(&points, &title))?;
+            let title = title(path, "error against images");
+            self.write(
+                "images",
+                &points,
+                &frontier::images(&points, &title, judge.basis()),
+            )?;
         }
         Ok(())
     }
@@ -131,9 +139,9 @@ impl Chart {
     }
 }
 
-fn title(path: &Path, what: &str, judge: &Judge) -> String {
+fn title(path: &Path, what: &str) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    format!("{name}: {what} ({})", judge.basis())
+    format!("{name}: {what}")
 }
 
 /// The main figures, cheapest first; a star marks the Pareto front over all cells.

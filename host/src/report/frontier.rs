@@ -40,7 +40,7 @@ const RIGHT: f64 = 14.0;
 const TOP: f64 = 28.0;
 const BOTTOM: f64 = 40.0;
 const COLUMNS: usize = 2;
-const LEGEND: f64 = 56.0;
+const LEGEND: f64 = 72.0;
 
 const STYLE: &str = "\
 svg { background: #fbfaf7; }
@@ -69,12 +69,12 @@ fn class(family: Family) -> &'static str {
     }
 }
 
-/// Error against core-seconds, as one SVG file.
-pub fn methods(points: &[Point], title: &str) -> String {
+/// Error against core-seconds, as one SVG file; `basis` says what is compared with what.
+pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
     let cost = |p: &Point| Some(p.core_s);
     page(
         points,
-        title,
+        (title, basis),
         "core-seconds of the full fill",
         cost,
         &|chart| {
@@ -83,14 +83,18 @@ pub fn methods(points: &[Point], title: &str) -> String {
                 .iter()
                 .filter_map(|k| chart.place(&points[*k]))
                 .collect();
-            let labels = points
+            let worth_a_name =
+                |k: usize, p: &Point| along.contains(&k) || p.is_default || p.name == "paper";
+            let named: Vec<(&Point, &str)> = points
                 .iter()
                 .enumerate()
-                .filter(|(k, p)| along.contains(k) || p.is_default || p.name == "paper");
+                .filter(|(k, point)| worth_a_name(*k, point))
+                .map(|(_, point)| (point, point.name.as_str()))
+                .collect();
             html! {
                 polyline class="front" points=(polyline(&line)) {}
                 @for point in points { (chart.dot(point)) }
-                @for (k, (_, point)) in labels.enumerate() { (chart.label(point, k)) }
+                (chart.names(&named))
             }
         },
     )
@@ -98,24 +102,27 @@ pub fn methods(points: &[Point], title: &str) -> String {
 
 /// Error against the number of images, as one SVG file. A series holds the points that differ only
 /// in the samples; those of central samples only are squares.
-pub fn images(points: &[Point], title: &str) -> String {
+pub fn images(points: &[Point], title: &str, basis: &str) -> String {
     let frames = |p: &Point| Some(p.frames as f64);
-    page(points, title, "images", frames, &|chart| {
+    page(points, (title, basis), "images", frames, &|chart| {
         let mut series: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
         for point in points.iter().filter(|p| !is_central(p)) {
             series.entry(method_of(point)).or_default().push(point);
         }
+        let last = series.values().filter_map(|points| points.last());
+        let central = points.iter().filter(|p| is_central(p));
+        let named: Vec<(&Point, &str)> = last
+            .map(|point| (*point, method_of(point)))
+            .chain(central.map(|point| (point, "central only")))
+            .collect();
         html! {
             @for points in series.values() {
                 @let line: Vec<(f64, f64)> = points.iter().filter_map(|p| chart.place(p)).collect();
                 polyline class=(format!("series {}", class(points[0].family)))
                     style="fill:none" points=(polyline(&line)) {}
-                @if let Some(last) = points.last() { (chart.named(last, method_of(last), 0)) }
             }
             @for point in points { (chart.dot(point)) }
-            @for point in points.iter().filter(|p| is_central(p)) {
-                (chart.named(point, "central only", 1))
-            }
+            (chart.names(&named))
         }
     })
 }
@@ -137,7 +144,7 @@ fn polyline(points: &[(f64, f64)]) -> String {
 
 fn page(
     points: &[Point],
-    title: &str,
+    (title, basis): (&str, &str),
     axis: &str,
     along: fn(&Point) -> Option<f64>,
     inside: &dyn Fn(&Panel) -> Markup,
@@ -154,13 +161,14 @@ fn page(
             style { (PreEscaped(STYLE)) }
             rect width="100%" height="100%" fill="#fbfaf7" {}
             (svg::text(LEFT, 18.0, "start", "title", title))
+            (svg::text(LEFT, 33.0, "start", "small", basis))
             @for (k, family) in Family::ALL.into_iter().enumerate() {
                 @let x = LEFT + 110.0 * k as f64;
-                circle cx=(svg::n(x + 4.0)) cy="36" r="3.5" class=(class(family)) {}
-                (svg::text(x + 13.0, 40.0, "start", "small", family.name()))
+                circle cx=(svg::n(x + 4.0)) cy="51" r="3.5" class=(class(family)) {}
+                (svg::text(x + 13.0, 55.0, "start", "small", family.name()))
             }
-            circle cx=(svg::n(LEFT + 554.0)) cy="36" r="6.5" class="default" {}
-            (svg::text(LEFT + 565.0, 40.0, "start", "small", "the default"))
+            circle cx=(svg::n(LEFT + 554.0)) cy="51" r="6.5" class="default" {}
+            (svg::text(LEFT + 565.0, 55.0, "start", "small", "the default"))
             @for (k, panel) in panels.iter().enumerate() {
                 @let (x, y) = ((k % COLUMNS) as f64 * W, LEGEND + (k / COLUMNS) as f64 * H);
                 g transform=(format!("translate({} {})", svg::n(x), svg::n(y))) {
@@ -264,22 +272,36 @@ impl Panel {
         }
     }
 
-    fn label(&self, point: &Point, k: usize) -> Markup {
-        self.named(point, &point.name, k)
-    }
-
-    /// A text beside a point, away from the panel's nearer side, above and below by turns.
-    fn named(&self, point: &Point, name: &str, k: usize) -> Markup {
-        let Some((x, y)) = self.place(point) else {
-            return html! {};
-        };
-        let dy = if k.is_multiple_of(2) { -7.0 } else { 14.0 };
-        let (anchor, dx) = if x > 0.55 * W {
-            ("end", -5.0)
-        } else {
-            ("start", 5.0)
-        };
-        svg::text(x + dx, y + dy, anchor, "small", name)
+    /// Names beside their points, away from the panel's nearer side, each as near to its point as
+    /// those before leave room.
+    fn names(&self, named: &[(&Point, &str)]) -> Markup {
+        /// Height and mean width of a letter.
+        const LETTER: (f64, f64) = (10.0, 5.0);
+        let mut taken: Vec<(f64, f64, f64)> = Vec::new();
+        let mut texts = Vec::new();
+        for (point, name) in named {
+            let Some((x, y)) = self.place(point) else {
+                continue;
+            };
+            let width = LETTER.1 * name.chars().count() as f64;
+            let (anchor, at, left) = if x > 0.55 * W {
+                ("end", x - 5.0, x - 5.0 - width)
+            } else {
+                ("start", x + 5.0, x + 5.0)
+            };
+            let is_free = |y: &f64| {
+                taken.iter().all(|(other, other_y, other_width)| {
+                    (y - other_y).abs() >= LETTER.0
+                        || left > other + other_width
+                        || *other > left + width
+                })
+            };
+            let places = [-7.0, 14.0, 25.0, -18.0, 36.0].map(|dy| y + dy);
+            let y = places.into_iter().find(is_free).unwrap_or(places[0]);
+            taken.push((left, y, width));
+            texts.push(svg::text(at, y, anchor, "small", name));
+        }
+        html! { @for text in texts { (text) } }
     }
 }
 
@@ -347,7 +369,7 @@ mod tests {
             point("<b>", 1000.0, 0.1),
             point("c", 1.0, 0.5),
         ];
-        let drawn = methods(&points, "a title");
+        let drawn = methods(&points, "a title", "a basis");
         // Two panels have figures: log RMS and cosine-weighted error over all.
         assert_eq!(drawn.matches("<title>").count(), 6);
         assert_eq!(
@@ -367,7 +389,7 @@ mod tests {
             point("m from 4 images", 1.0, 0.2),
             point("m from 8 images, central samples only", 1.0, 0.4),
         ];
-        let drawn = images(&points, "t");
+        let drawn = images(&points, "t", "b");
         assert_eq!(drawn.matches("<polyline").count(), 2);
         assert_eq!(drawn.matches("central only").count(), 2);
     }
