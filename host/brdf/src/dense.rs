@@ -1,6 +1,6 @@
 //! A BRDF on every cell of the grid.
 
-use crate::direction::{Direction, Vec3, wrap_deg};
+use crate::direction::{Direction, Vec3};
 use crate::grid::Grid;
 use crate::model::Brdf;
 use rayon::prelude::*;
@@ -73,8 +73,8 @@ impl DenseBrdf {
     /// The value at any pair of directions, linear between the nodes in all four angles; beyond
     /// the last elevation the last node's value.
     pub fn lookup(&self, light: Direction, view: Direction) -> [f32; 3] {
-        let light = self.corners(light);
-        let view = self.corners(view);
+        let light = self.grid.corners(light);
+        let view = self.grid.corners(view);
         let mut sum = [0.0f64; 3];
         for (i, wi) in light {
             for (v, wv) in view {
@@ -88,24 +88,6 @@ impl DenseBrdf {
             }
         }
         sum.map(|s| s as f32)
-    }
-
-    /// The four nodes around a direction with their bilinear weights.
-    fn corners(&self, d: Direction) -> [(usize, f64); 4] {
-        let step = self.grid.step_deg();
-        let n_phi = self.grid.n_phi();
-        let t = (d.theta_deg() / step).clamp(0.0, (self.grid.n_theta() - 1) as f64);
-        let p = wrap_deg(d.phi_deg()) / step;
-        let (t0, p0) = (t.floor() as usize, p.floor() as usize);
-        let t1 = (t0 + 1).min(self.grid.n_theta() - 1);
-        let (p0, p1) = (p0 % n_phi, (p0 + 1) % n_phi);
-        let (ft, fp) = (t - t.floor(), p - p.floor());
-        [
-            (t0 * n_phi + p0, (1.0 - ft) * (1.0 - fp)),
-            (t0 * n_phi + p1, (1.0 - ft) * fp),
-            (t1 * n_phi + p0, ft * (1.0 - fp)),
-            (t1 * n_phi + p1, ft * fp),
-        ]
     }
 }
 

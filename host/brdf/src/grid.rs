@@ -103,6 +103,24 @@ impl Grid {
         Some(i_theta as usize * self.n_phi + i_phi)
     }
 
+    /// The four nodes around a direction with their bilinear weights; beyond the last elevation
+    /// those of its last ring.
+    pub fn corners(&self, d: Direction) -> [(usize, f64); 4] {
+        let (step, n_phi) = (self.step_deg(), self.n_phi);
+        let t = (d.theta_deg() / step).clamp(0.0, (self.n_theta - 1) as f64);
+        let p = wrap_deg(d.phi_deg()) / step;
+        let (t0, p0) = (t.floor() as usize, p.floor() as usize);
+        let t1 = (t0 + 1).min(self.n_theta - 1);
+        let (p0, p1) = (p0 % n_phi, (p0 + 1) % n_phi);
+        let (ft, fp) = (t - t.floor(), p - p.floor());
+        [
+            (t0 * n_phi + p0, (1.0 - ft) * (1.0 - fp)),
+            (t0 * n_phi + p1, (1.0 - ft) * fp),
+            (t1 * n_phi + p0, ft * (1.0 - fp)),
+            (t1 * n_phi + p1, ft * fp),
+        ]
+    }
+
     /// The cell of a pair of direction indices: `light·n_directions + view`.
     pub fn cell(&self, light: usize, view: usize) -> usize {
         light * self.n_directions() + view

@@ -4,6 +4,7 @@
 //! seen from above, both in radians unless a name ends in `_deg`; a unit vector is
 //! `(sin θ cos φ, sin θ sin φ, cos θ)`.
 pub mod bins;
+pub mod cellwise;
 pub mod dense;
 pub mod direction;
 pub mod grid;

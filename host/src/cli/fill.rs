@@ -1,5 +1,6 @@
 //! `gonia fill`: samples → bins → dense BRDF.
 
+use super::method::Method;
 use super::progress::Progress;
 use super::provenance::{Provenance, of_this_program};
 use super::table;
@@ -8,6 +9,7 @@ use crate::dataset::error_exr::write_error_bars;
 use crate::dataset::samples::read_samples;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
+use gonia_brdf::cellwise::{self, CellSettings};
 use gonia_brdf::interpolate::{self, Calibration, ErrorBars, Origin, Preset, Settings};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::{Path, PathBuf};
@@ -28,6 +30,10 @@ pub struct Fill {
     error: Option<PathBuf>,
     #[command(flatten)]
     how: How,
+    /// default, or a method that works cell by cell: paper, nearest, shepard, mls1, mls2,
+    /// rbf-KERNEL (core-hours on the 2-degree grid)
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    method: Method,
     /// What the samples' values are: relative, or absolute (1/sr)
     #[arg(long, value_enum, default_value = "relative")]
     scale: ScaleArgument,
@@ -183,12 +189,15 @@ impl Fill {
         }
         let mut progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(&self.samples))?;
+        if let Method::Cellwise(settings) = self.method {
+            if self.error.is_some() {
+                bail!("--error: only the default method has error bars; leave out --method");
+            }
+            return self.fill_cellwise(samples, grid, &settings, &mut progress);
+        }
         let filled = fill(samples, grid, base, self.error.is_some(), &mut progress)
             .with_context(|| self.samples.display().to_string())?;
-        let scale = match self.scale {
-            ScaleArgument::Relative => Scale::Relative,
-            ScaleArgument::Absolute => Scale::Absolute,
-        };
+        let scale = self.scale.into();
         let file = DenseFile {
             brdf: filled.dense,
             scale,
@@ -242,6 +251,57 @@ impl Fill {
         }
         table::print(&rows);
         Ok(())
+    }
+}
+
+impl Fill {
+    /// Fills with one of the methods that the default is compared with.
+    fn fill_cellwise(
+        &self,
+        samples: Vec<Sample>,
+        grid: Grid,
+        settings: &CellSettings,
+        progress: &mut Progress,
+    ) -> Result<()> {
+        let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
+        drop(samples);
+        let filled = progress
+            .stage("interpolating", |tell| {
+                cellwise::fill(&bins, settings, tell)
+            })
+            .with_context(|| self.samples.display().to_string())?;
+        let mut provenance = of_this_program();
+        provenance.insert("interpolation".into(), settings.to_string());
+        provenance.insert("samples".into(), self.samples.display().to_string());
+        let file = DenseFile {
+            brdf: filled.dense,
+            scale: self.scale.into(),
+            provenance,
+        };
+        progress.stage("writing the dense BRDF", |_| {
+            write_dense(&self.output, file)
+        })?;
+        table::print(&[
+            ("bins filled".into(), table::count(bins.bins().len() as u64)),
+            ("cells".into(), table::count(grid.n_cells() as u64)),
+            ("method".into(), settings.to_string()),
+            (
+                "failed, given the nearest value".into(),
+                table::count(filled.failed),
+            ),
+            ("not positive, raised".into(), table::count(filled.raised)),
+            ("written".into(), self.output.display().to_string()),
+        ]);
+        Ok(())
+    }
+}
+
+impl From<ScaleArgument> for Scale {
+    fn from(argument: ScaleArgument) -> Self {
+        match argument {
+            ScaleArgument::Relative => Scale::Relative,
+            ScaleArgument::Absolute => Scale::Absolute,
+        }
     }
 }
 

@@ -7,6 +7,7 @@ mod compare;
 mod demo;
 mod device;
 mod fill;
+mod method;
 mod plan;
 mod process;
 mod progress;

@@ -145,7 +145,7 @@ pub fn compare(a: Table<'_>, b: Side<'_>, options: &Options<'_>) -> Result<Figur
 }
 
 /// Mean ΔE2000 over the pixels both pictures cover, at the exposure of the second.
-fn picture_delta_e(a: &Picture, b: &Picture) -> f64 {
+pub(super) fn picture_delta_e(a: &Picture, b: &Picture) -> f64 {
     let exposure = b.exposure(0.99, 0.9);
     let shown = |rgb: [f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));
     let mut sum = 0.0;

@@ -5,6 +5,7 @@
 //! question: how fast the arms may be and how true they are then.
 
 mod accumulate;
+pub mod chart;
 pub mod color;
 pub mod compare;
 pub mod figures;

@@ -6,6 +6,7 @@
 mod charts;
 mod color_map;
 pub mod folder;
+pub mod frontier;
 mod html;
 mod motion;
 mod panels;

@@ -156,7 +156,7 @@ fn bounded_exp(log: f32) -> f32 {
 }
 
 /// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
-fn spread_poles(grid: Grid, plane: &mut [f32]) {
+pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
     if plane.is_empty() {
         return;
     }

@@ -61,7 +61,7 @@ pub fn nodes_of<'a>(
 }
 
 /// The smallest value per channel that takes part.
-fn floor_of<'a>(bins: impl Iterator<Item = &'a Bin> + Clone) -> [f32; 3] {
+pub(crate) fn floor_of<'a>(bins: impl Iterator<Item = &'a Bin> + Clone) -> [f32; 3] {
     [0, 1, 2].map(|c| {
         // A few thousand bins tell the median brightness well enough for a floor.
         let total = bins.clone().count().max(1);
