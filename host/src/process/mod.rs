@@ -234,8 +234,11 @@ impl<'a> Bench<'a> {
                     progress(stage, 1 + done.fetch_add(1, Ordering::Relaxed), rows.len());
                     Ok(result)
                 })
-                .collect::<Result<Vec<T>, ProcessError>>()?;
-            results.into_iter().for_each(&mut gather);
+                .collect::<Vec<Result<T, ProcessError>>>();
+            // In order: of several bad frames the first one is named, whichever thread met one first.
+            for result in results {
+                gather(result?);
+            }
         }
         Ok(())
     }
