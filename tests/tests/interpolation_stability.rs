@@ -164,7 +164,6 @@ fn rows() -> Vec<Row> {
         ),
         Row {
             neighbours: Some(3),
-            misses: true,
             ..row("3 neighbours", cloth(), plan, interior, 0.2)
         },
         row(
@@ -210,46 +209,40 @@ fn rows() -> Vec<Row> {
             interior,
             0.1,
         ),
-        Row {
-            misses: true,
-            ..row(
-                "2 % of the samples NaN, 2 % negative",
-                cloth(),
-                |truth| {
-                    let mut samples = plan(truth);
-                    for (k, sample) in samples.iter_mut().enumerate() {
-                        match noise(11, k) {
-                            x if x < 0.02 => sample.rgb[1] = f32::NAN,
-                            x if x < 0.04 => sample.rgb = [-0.05; 3],
-                            _ => {}
-                        }
+        row(
+            "2 % of the samples NaN, 2 % negative",
+            cloth(),
+            |truth| {
+                let mut samples = plan(truth);
+                for (k, sample) in samples.iter_mut().enumerate() {
+                    match noise(11, k) {
+                        x if x < 0.02 => sample.rgb[1] = f32::NAN,
+                        x if x < 0.04 => sample.rgb = [-0.05; 3],
+                        _ => {}
                     }
-                    samples
-                },
-                interior,
-                0.1,
-            )
-        },
-        Row {
-            misses: true,
-            ..row(
-                "a mirror-like lobe, α = 0.01, no frame sees its whole",
-                Box::new(Kurt::new(
-                    [0.2, 0.15, 0.1],
-                    &[KurtLobe {
-                        specular: [0.3; 3],
-                        f0: 0.05,
-                        mx: 0.01,
-                        my: 0.01,
-                        alpha: 0.3,
-                        azimuth_deg: 0.0,
-                    }],
-                )),
-                plan,
-                |i, v| interior(i, v) && half_deg(i, v) < 8.0,
-                1.5,
-            )
-        },
+                }
+                samples
+            },
+            interior,
+            0.1,
+        ),
+        row(
+            "a mirror-like lobe, α = 0.01, no frame sees its whole",
+            Box::new(Kurt::new(
+                [0.2, 0.15, 0.1],
+                &[KurtLobe {
+                    specular: [0.3; 3],
+                    f0: 0.05,
+                    mx: 0.01,
+                    my: 0.01,
+                    alpha: 0.3,
+                    azimuth_deg: 0.0,
+                }],
+            )),
+            plan,
+            |i, v| interior(i, v) && half_deg(i, v) < 8.0,
+            1.5,
+        ),
     ]
 }
 
