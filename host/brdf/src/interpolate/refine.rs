@@ -105,7 +105,10 @@ impl Refiner {
         (light, view): (Vec3, Vec3),
     ) -> ([f32; 3], [f32; 3]) {
         let cut = self.count.cut;
-        self.solve(levels, settings, p, q);
+        // Only where a pair may be cut must it be solved to know whether it is.
+        if !p.children.is_empty() {
+            self.solve(levels, settings, p, q);
+        }
         let nearest = |patch: &'_ Patch, direction: Vec3| {
             let along = |c: &Child| dot(c.patch.centre, direction);
             let parts = 0..patch.children.len();
