@@ -56,6 +56,26 @@ impl Count {
 impl Refiner {
     /// Interpolates the cells of a pair: see [`Self::logs`] and [`Self::variances`].
     pub fn solve(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
+        if !self.solve_whole(levels, settings, p, q) {
+            return;
+        }
+        let mut logs = std::mem::take(&mut self.logs);
+        for a in &p.children {
+            for b in &q.children {
+                self.solve_part(levels, settings, a, b);
+                for (k, place) in places_in(a, b, q).enumerate() {
+                    logs[place] = self.part[k];
+                    if self.with_variances {
+                        self.variances[place] = self.part_variances[k];
+                    }
+                }
+            }
+        }
+        self.logs = logs;
+    }
+
+    /// The pair as one coarse block; whether it must be cut.
+    fn solve_whole(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) -> bool {
         self.count.pairs += 1;
         self.fit_whole(levels, settings, p, q);
         let mut logs = std::mem::take(&mut self.logs);
@@ -64,25 +84,15 @@ impl Refiner {
             self.variances.clear();
             self.solver.variances_at(&self.places, &mut self.variances);
         }
+        let mut cut = false;
         if let Some((a, b)) = steepest(&logs, p, q) {
             self.solve_part(levels, settings, a, b);
             let limit = settings.tolerance * settings.noise_variance.sqrt().max(NOISE_MIN);
-            if self.rms_from(&logs, q, a, b) > limit {
-                self.count.cut += 1;
-                for a in &p.children {
-                    for b in &q.children {
-                        self.solve_part(levels, settings, a, b);
-                        for (k, place) in places_in(a, b, q).enumerate() {
-                            logs[place] = self.part[k];
-                            if self.with_variances {
-                                self.variances[place] = self.part_variances[k];
-                            }
-                        }
-                    }
-                }
-            }
+            cut = self.rms_from(&logs, q, a, b) > limit;
         }
+        self.count.cut += usize::from(cut);
         self.logs = logs;
+        cut
     }
 
     /// Natural logarithms of the cells of the last pair, light by light.
@@ -104,18 +114,15 @@ impl Refiner {
         (p, q): (&Patch, &Patch),
         (light, view): (Vec3, Vec3),
     ) -> ([f32; 3], [f32; 3]) {
-        let cut = self.count.cut;
-        // Only where a pair may be cut must it be solved to know whether it is.
-        if !p.children.is_empty() {
-            self.solve(levels, settings, p, q);
-        }
+        // Only where a pair may be cut must its cells be known.
+        let cut = !p.children.is_empty() && self.solve_whole(levels, settings, p, q);
         let nearest = |patch: &'_ Patch, direction: Vec3| {
             let along = |c: &Child| dot(c.patch.centre, direction);
             let parts = 0..patch.children.len();
             parts.max_by(|a, b| along(&patch.children[*a]).total_cmp(&along(&patch.children[*b])))
         };
         match (nearest(p, light), nearest(q, view)) {
-            (Some(a), Some(b)) if self.count.cut > cut => {
+            (Some(a), Some(b)) if cut => {
                 let centre = (p.children[a].patch.centre, q.children[b].patch.centre);
                 self.fit_part(levels, settings, centre.0, centre.1);
             }
