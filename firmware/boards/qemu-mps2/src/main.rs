@@ -20,8 +20,8 @@ mod uart;
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
-use cortex_m_rt::exception;
-use embassy_executor::Spawner;
+use cortex_m_rt::{entry, exception};
+use embassy_executor::InterruptExecutor;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Instant, Timer};
 use gonia_firmware::controller::Controller;
@@ -34,13 +34,27 @@ use static_cell::StaticCell;
 
 use crate::arm::EmulatedArm;
 
-#[embassy_executor::main]
-async fn main(spawner: Spawner) {
+/// The tasks run in an interrupt, so that the processor sleeps by `wfi`. A thread's executor sleeps by
+/// `wfe`, which the emulator takes for an invitation to spin; it then holds its lock so often that
+/// the bytes of the wire wait for seconds.
+static TASKS: InterruptExecutor = InterruptExecutor::new();
+/// Of an interrupt that no peripheral of this program uses (TIMER1).
+const TASKS_IRQ: u16 = 9;
+/// Below that of the peripherals, which keep the highest.
+const TASKS_PRIORITY: u8 = 0x80;
+
+#[entry]
+fn main() -> ! {
     static LOG_PORT: StaticCell<uart::LogPort> = StaticCell::new();
     time::start();
     uart::start();
     steps::start();
     defmt_serial::defmt_serial(LOG_PORT.init(uart::LogPort));
+    if let Some(mut cores) = cortex_m::Peripherals::take() {
+        // SAFETY: nothing runs yet that counts on another priority.
+        unsafe { cores.NVIC.set_priority(Irq(TASKS_IRQ), TASKS_PRIORITY) };
+    }
+    let spawner = TASKS.start(Irq(TASKS_IRQ));
     for irq in [time::IRQ, steps::IRQ, uart::RX_IRQ] {
         // SAFETY: the handlers share data with tasks only through critical sections.
         unsafe { NVIC::unmask(Irq(irq)) };
@@ -48,6 +62,9 @@ async fn main(spawner: Spawner) {
     match run_arm() {
         Ok(task) => spawner.spawn(task),
         Err(_) => defmt::error!("the arm's task is running already"),
+    }
+    loop {
+        cortex_m::asm::wfi();
     }
 }
 
@@ -125,6 +142,8 @@ unsafe fn DefaultHandler(irq: i16) {
         steps::IRQ => steps::on_period(),
         time::IRQ => time::on_alarm(),
         uart::RX_IRQ => uart::on_receive(),
+        // SAFETY: this is the interrupt that `main` has started the tasks with.
+        TASKS_IRQ => unsafe { TASKS.on_interrupt() },
         _ => {}
     }
 }
