@@ -26,9 +26,10 @@ const N_POSES: usize = 50;
 const TRAIN_AFTER: usize = 20;
 const SILENT_AFTER: usize = 35;
 const STOP_AFTER: usize = 42;
-/// A step and a count of the encoder, µdeg. Where an arm stops that is told to stop in mid-move is a
-/// matter of time, and so is which of the steps around a target is reached from there.
-const STEP_UDEG: u32 = 2_500 + 1_374;
+/// Where an arm stops that is told to stop in mid-move is a matter of time, and so is which of the steps
+/// around a target is reached from there, and by how much of a count its next home differs from the
+/// last. So two readings may differ by a step, a count of the zero and a count of the reading, µdeg.
+const STEP_UDEG: u32 = 2_500 + 2 * 1_374;
 /// The share of bytes that are bent on the way, each way.
 const ONE_IN: u32 = 1500;
 
