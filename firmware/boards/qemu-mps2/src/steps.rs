@@ -2,8 +2,9 @@
 //! when it next runs down, as a real board's has.
 //!
 //! The pulses go nowhere but into a list, with the time at which a timer that keeps time would have
-//! given them; the main loop moves the simulated motors by it. QEMU's interrupts come late and in
-//! bunches, and a motor would lose steps by that.
+//! given them and a main loop that is never late; that loop moves the simulated motors by it. QEMU's
+//! interrupts come late and in bunches and its main loop may wait for a busy machine while the queue
+//! runs dry, and a motor would lose steps by either.
 
 use core::cell::RefCell;
 
@@ -24,6 +25,8 @@ const BASE: [usize; 2] = [0x4000_2000, 0x4000_2020];
 const RUN: u32 = 0b1110_0010;
 /// 25 MHz.
 const CLOCKS: u64 = 25;
+/// A run that begins so soon after the last one may be the rest of it, 1/256 µs: 1 s.
+const LATE_TICKS: u64 = 1_000_000 * TICKS_PER_US;
 
 type Channel = Mutex<RefCell<StepChannel<HalfTimer>>>;
 
@@ -68,7 +71,9 @@ pub fn queue(axis: Axis, period: Period) {
     critical_section::with(|cs| {
         let mut channel = CHANNELS[axis.index()].borrow_ref_mut(cs);
         if !channel.progress().is_playing {
-            channel.timer().ideal_ticks = now_us() * TICKS_PER_US;
+            let now_ticks = now_us() * TICKS_PER_US;
+            let timer = channel.timer();
+            timer.ideal_ticks = timer.ideal_ticks.max(now_ticks.saturating_sub(LATE_TICKS));
         }
         // The firmware has asked whether there is room.
         let _ = channel.push(period);
@@ -104,11 +109,16 @@ fn on_period_of(axis: Axis, channel: &mut StepChannel<HalfTimer>) {
         return;
     }
     let timer = channel.timer();
-    timer.ideal_ticks += u64::from(timer.running_ticks);
+    let ended_ticks = timer.ideal_ticks + u64::from(timer.running_ticks);
     timer.running_ticks = timer.next_ticks;
-    let at_us = timer.ideal_ticks / TICKS_PER_US;
-    if channel.period_ended() == End::Step {
+    let end = channel.period_ended();
+    if end == End::Rest {
+        return;
+    }
+    channel.timer().ideal_ticks = ended_ticks;
+    if end == End::Step {
         let up = channel.timer().up;
+        let at_us = ended_ticks / TICKS_PER_US;
         // The main loop takes them out more often than there is room for.
         let _ = critical_section::with(|cs| {
             GIVEN
