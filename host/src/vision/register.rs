@@ -573,3 +573,7 @@ fn crossing(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     let t = (g[0] * e[1] - g[1] * e[0]) / det;
     Some([a[0][0] + t * d[0], a[0][1] + t * d[1]])
 }
+
+#[cfg(test)]
+#[path = "photograph_tests.rs"]
+mod photograph_tests;
