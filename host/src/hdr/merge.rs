@@ -8,8 +8,10 @@
 use crate::dataset::rig::Sensor;
 
 /// Weights fall to zero over this share of the range below saturation. A sharp limit would keep the
-/// exposures whose noise is negative and drop the others.
-const TAPER: f32 = 0.2;
+/// exposures whose noise is negative and drop the others; so would a weight by an exposure's own
+/// counts, and one by the other exposures' the other way about. The weighted mean of all says nothing
+/// of their differences, so weights by it favour none.
+const TAPER: f32 = 0.05;
 /// The linearity check looks at every so many photosites,
 const CHECK_STEP: usize = 5;
 /// at those whose longer exposure has counts within these shares of the range,
@@ -81,23 +83,28 @@ impl Noise {
             return (f32::INFINITY, f32::INFINITY);
         };
         let rate = ((f32::from(counts) - self.black) / longest).max(0.0);
-        let taper = 1.0 / (TAPER * (self.saturation - self.black));
-        let (mut sum, mut total, mut spread) = (0.0, 0.0, 0.0);
-        for (time, counts) in exposures.filter(usable) {
-            let counts = f32::from(counts);
+        let range = self.saturation - self.black;
+        // Rate, its time and its variance.
+        let told = exposures.filter(usable).filter_map(|(time, counts)| {
             let expected = rate * time;
             // Beside a longer exposure, one that drowns in read noise says nothing.
             if time < longest && expected < self.read {
-                continue;
+                return None;
             }
-            let variance =
-                (expected * self.counts_per_electron + self.fixed_variance) / (time * time);
-            let weight = ((self.saturation - counts) * taper).min(1.0) / variance;
-            sum += weight * (counts - self.black) / time;
-            total += weight;
-            spread += weight * weight * variance;
+            let variance = expected * self.counts_per_electron + self.fixed_variance;
+            let told = (f32::from(counts) - self.black) / time;
+            Some((told, time, variance / (time * time)))
+        });
+        let (all, spread) = mean(told.clone().map(|(told, _, v)| (told, v, 1.0 / v)));
+        let tapered = told.map(|(told, time, v)| {
+            let below = (range - all * time) / (TAPER * range);
+            (told, v, below.clamp(0.0, 1.0) / v)
+        });
+        // Nothing is left where the only exposure that is not saturated nearly is.
+        match mean(tapered) {
+            (value, variance) if value.is_finite() => (value, variance),
+            _ => (all, spread),
         }
-        (sum / total, spread / (total * total))
     }
 
     /// Compares two exposures over the photosites that both show well, chosen by the longer one.
@@ -120,4 +127,15 @@ impl Noise {
             deviation: sums[1] / longer.0 / (sums[0] / shorter.0) - 1.0,
         })
     }
+}
+
+/// Mean and its variance of values with variances and weights; not a number without weight.
+fn mean(values: impl Iterator<Item = (f32, f32, f32)>) -> (f32, f32) {
+    let (mut sum, mut total, mut spread) = (0.0, 0.0, 0.0);
+    for (value, variance, weight) in values {
+        sum += weight * value;
+        total += weight;
+        spread += weight * weight * variance;
+    }
+    (sum / total, spread / (total * total))
 }
