@@ -11,7 +11,7 @@ use crate::dataset::rig::Sensor;
 /// exposures whose noise is negative and drop the others; so would a weight by an exposure's own
 /// counts, and one by the other exposures' the other way about. The weighted mean of all says nothing
 /// of their differences, so weights by it favour none.
-const TAPER: f32 = 0.05;
+const TAPER: f32 = 0.1;
 /// The linearity check looks at every so many photosites,
 const CHECK_STEP: usize = 5;
 /// at those whose longer exposure has counts within these shares of the range,
