@@ -39,8 +39,9 @@ pub fn test() -> Result<()> {
     table.step("tests", || run(cargo(&root).args(["test", "--workspace"])))?;
     if qemu {
         table.step("firmware in QEMU", || {
+            // With the whole workspace's features, as they have been built for the tests above.
             run(cargo(&root)
-                .args(["test", "-p", "gonia-tests", "--test", "controllers_qemu"])
+                .args(["test", "--workspace", "--test", "controllers_qemu"])
                 .args(["--", "--ignored", "--nocapture"])
                 .env("GONIA_QEMU_ELF", qemu_elf(&root)))
         })?;
