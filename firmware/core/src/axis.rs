@@ -157,7 +157,14 @@ impl AxisDrive {
                 push(interval / 2, End::Turn(self.forward));
                 ticks -= interval / 2;
             }
-            push(ticks, End::Step);
+            push(
+                ticks,
+                if profile.is_step() {
+                    End::Step
+                } else {
+                    End::Rest
+                },
+            );
             self.is_playing = true;
             if !profile.advance() {
                 let next = self.take_up.take();
@@ -321,6 +328,7 @@ impl AxisDrive {
         Ramp::new(
             settings.get_u64(self.axis, speed),
             settings.get_u64(self.axis, Key::Acceleration),
+            settings.get_u64(self.axis, Key::AccelerationRise),
             self.steps_per_turn.unsigned_abs(),
         )
     }

@@ -134,8 +134,10 @@ impl Homing {
 
     fn clear(&mut self, drive: &mut AxisDrive, settings: &Settings) {
         let get = |key| i64::from(settings.get(drive.axis(), key));
-        // What the fast search ran past the switch: v²/2a.
-        let overrun = get(Key::HomeFastSpeed).pow(2) / (2 * get(Key::Acceleration)).max(1);
+        // What the fast search ran past the switch: v²/2a, and half the rise at full speed.
+        let speed = get(Key::HomeFastSpeed);
+        let overrun = speed.pow(2) / (2 * get(Key::Acceleration)).max(1)
+            + speed * get(Key::AccelerationRise) / 2_000_000;
         let way = overrun + MAX_BELOW * get(Key::HomeBackoff);
         drive.run(drive.steps_of(way), clearing_ramp(drive, settings));
         self.same_readings = 0;
@@ -157,6 +159,7 @@ fn clearing_ramp(drive: &AxisDrive, settings: &Settings) -> crate::profile::Ramp
     crate::profile::Ramp::new(
         settings.get_u64(drive.axis(), Key::HomeFastSpeed) / CLEARING_SLOWDOWN,
         settings.get_u64(drive.axis(), Key::Acceleration),
+        settings.get_u64(drive.axis(), Key::AccelerationRise),
         settings.get_u64(drive.axis(), Key::StepsPerTurn),
     )
 }
