@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 27;
+pub const N_SETTINGS: usize = 30;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -83,7 +83,7 @@ pub enum Key {
     /// Time between telemetry while moving, µs; 0 for none. Of the node: both axes share it.
     Telemetry = 20,
     /// How far steps and encoder, both counted from home, may disagree at rest, µdeg. More means that
-    /// one of both is wrong, and only the home switch can tell which.
+    /// one of both is wrong, and only the home switch can tell which. Calibrating makes it narrower.
     StepsDisagree = 21,
     /// Error map of the encoder (see `gonia_firmware::error_map`): cosine, once a turn, µdeg.
     EncoderCos1 = 22,
@@ -96,6 +96,12 @@ pub enum Key {
     /// How long acceleration takes to build up and to die down, µs: jerk is acceleration / rise. 0 for a
     /// trapezoid of speed. Near the period of the arm's swing it keeps the arm from swinging.
     AccelerationRise = 26,
+    /// The worm's turn at the shaft, µdeg: the period of the gear's error.
+    WormTurn = 27,
+    /// Error of the gear: how far the shaft is ahead of the steps, cosine, once a turn of the worm, µdeg.
+    GearCos = 28,
+    /// Sine of the same, µdeg.
+    GearSin = 29,
 }
 
 /// What a key means.
@@ -272,9 +278,18 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         (0, 1_000_000),
         [125_000; 2],
     ),
+    m(
+        Key::WormTurn,
+        "worm_turn",
+        "µdeg",
+        (10_000, 360 * DEG),
+        [4 * DEG; 2],
+    ),
+    map(Key::GearCos, "gear_cos"),
+    map(Key::GearSin, "gear_sin"),
 ];
 
-/// An amplitude of the encoder's error map.
+/// An amplitude of an error.
 const fn map(key: Key, name: &'static str) -> Meaning {
     m(key, name, "µdeg", (-500_000, 500_000), [0; 2])
 }
@@ -304,6 +319,9 @@ impl Key {
         Key::EncoderCos2,
         Key::EncoderSin2,
     ];
+
+    /// The keys of a gear's error map.
+    pub const GEAR_MAP: [Key; 3] = [Key::WormTurn, Key::GearCos, Key::GearSin];
 
     /// The key of a number, if there is one.
     pub fn from_number(number: u8) -> Option<Self> {

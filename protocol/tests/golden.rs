@@ -264,6 +264,9 @@ fn no_setting_has_ever_changed_its_number_or_its_unit() {
         "24 encoder_cos2 µdeg",
         "25 encoder_sin2 µdeg",
         "26 acceleration_rise µs",
+        "27 worm_turn µdeg",
+        "28 gear_cos µdeg",
+        "29 gear_sin µdeg",
     ];
     assert_eq!(listed, frozen);
 }

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use gonia::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
-use gonia::link::{Controller, LinkError, calibrate_encoder};
+use gonia::link::{Controller, LinkError, calibrate_axis};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
@@ -376,8 +376,8 @@ fn eccentric(theta: &mut PlantConfig) {
 fn calibrate_theta(rig: &SimRig, light: &mut Controller) {
     let stands: Vec<i32> = (0..10).map(|i| i * 9_700_000).collect();
     let mut autocollimator = |_: &mut Controller, _| Ok(rig.true_deg(Arm::Light)[0]);
-    let fit = calibrate_encoder(light, THETA, &stands, false, &mut autocollimator).unwrap();
-    assert!(fit.rms_after_deg < 0.001, "{fit:?}");
+    let fit = calibrate_axis(light, THETA, &stands, false, &mut autocollimator).unwrap();
+    assert!(fit.encoder.rms_after_deg < 0.001, "{fit:?}");
 }
 
 // ---- what a row comes to ----

@@ -27,6 +27,8 @@ const MAX_STEPS: u32 = 1 << 27;
 const MAX_CRUISE_MS: u64 = 1 << 30;
 const MAX_RAMP_MS: u64 = 1 << 21;
 const MAX_RISE_MS: u64 = 1 << 10;
+/// Times [`MAX_STEPS`] it is a `u64`: 268 s a step.
+const MOST_A_STEP: u64 = 1 << 36;
 /// Fraction bits of [`Ramp::ms2_per_step`].
 const AREA_BITS: u32 = 12;
 /// Bits of a step that are left to work out times within a millisecond.
@@ -56,27 +58,31 @@ impl Ramp {
         steps_per_turn: u64,
     ) -> Self {
         const TURN_UDEG: u64 = 360_000_000;
-        let acceleration = acceleration_udeg_s2.max(1);
-        let ramp_ms = speed_udeg_s.saturating_mul(1000).div_ceil(acceleration);
+        // Beyond what the settings allow, so that no product below overflows.
+        let speed = speed_udeg_s.clamp(1, 1 << 30);
+        let acceleration = acceleration_udeg_s2.clamp(1, 1 << 31);
+        let steps_per_turn = steps_per_turn.clamp(1, 1 << 24);
         // 360e6 µdeg · 1e6 ms²/s² · 2¹² = 1.5e18 fits; so does 360e6 µdeg · 256e6 ticks/s.
         let ms2_turn = (TURN_UDEG * 1_000_000) << AREA_BITS;
         let ticks_turn = TURN_UDEG * 1_000_000 * TICKS_PER_US;
         Self {
-            interval: ticks_turn.div_ceil(speed_udeg_s.saturating_mul(steps_per_turn).max(1)),
-            ms2_per_step: ms2_turn.div_ceil(acceleration.saturating_mul(steps_per_turn).max(1)),
-            ramp_ms: ramp_ms.clamp(1, MAX_RAMP_MS),
+            interval: ticks_turn.div_ceil(speed * steps_per_turn).min(MOST_A_STEP),
+            ms2_per_step: ms2_turn
+                .div_ceil(acceleration * steps_per_turn)
+                .min(MOST_A_STEP),
+            ramp_ms: (speed * 1000).div_ceil(acceleration).min(MAX_RAMP_MS),
             rise_ms: rise_us.div_ceil(1000).clamp(1, MAX_RISE_MS),
         }
     }
 
     /// The boxes p and r of a run.
     fn boxes(&self, steps: u64) -> (u64, u64) {
-        let cruise_ms = steps.saturating_mul(self.interval).div_ceil(MS);
+        let cruise_ms = (steps * self.interval).div_ceil(MS);
         let (mut ramp_ms, rise_ms) = (self.ramp_ms, self.rise_ms);
         if cruise_ms < ramp_ms + rise_ms {
             // Too short for full speed: N = a·p·r with p = r + j.
-            let area = steps.saturating_mul(self.ms2_per_step) >> AREA_BITS;
-            let root = (rise_ms * rise_ms + (area + 1).saturating_mul(4)).isqrt();
+            let area = (steps * self.ms2_per_step >> AREA_BITS) + 1;
+            let root = (rise_ms * rise_ms + 4 * area).isqrt();
             ramp_ms = ramp_ms.min((root - rise_ms) / 2 + 1);
         }
         let cruise_ms = cruise_ms.max(ramp_ms + rise_ms).min(MAX_CRUISE_MS);
