@@ -172,7 +172,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "home_tolerance",
         "µdeg",
         (1000, 170 * DEG),
-        [20_000; 2],
+        [15_000; 2],
     ),
     m(
         Key::MaxSpeed,

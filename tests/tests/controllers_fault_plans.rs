@@ -10,6 +10,7 @@ use gonia_sim::fault::FaultPlan;
 use gonia_sim::random_faults::{Weather, random_faults};
 use gonia_tests::calibrated::{self, BEGIN_US};
 use gonia_tests::poses::{of_the_paper, scattered, true_error_deg};
+use rayon::prelude::*;
 
 /// Time of a pose on a good day, µs.
 const POSE_US: u64 = 3_000_000;
@@ -114,15 +115,14 @@ fn weather(poses: usize, passing: u32, lasting: u32) -> Weather {
 #[test]
 fn on_bad_days_no_frame_is_kept_whose_arms_were_elsewhere() {
     let poses = scattered(200);
-    let mut stopped = 0;
-    for seed in 1..=6 {
+    let stopped = (1..=6u64).into_par_iter().filter(|&seed| {
         let plan = random_faults(seed, weather(poses.len(), 30, u32::from(seed % 3 == 0)));
         let day = day(seed, plan.clone(), &poses);
         print(seed, &plan, &day);
         check(seed, &day, poses.len());
-        stopped += usize::from(day.result.is_err());
-    }
-    assert!(stopped > 0, "the lasting faults had no effect");
+        day.result.is_err()
+    });
+    assert!(stopped.count() > 0, "the lasting faults had no effect");
 }
 
 #[test]
@@ -140,11 +140,11 @@ fn a_bad_day_comes_again_to_the_byte() {
 #[ignore = "takes minutes; prints figures"]
 fn the_papers_plan_on_bad_days() {
     let poses = of_the_paper();
-    for seed in 101..=104 {
+    (101..=112u64).into_par_iter().for_each(|seed| {
         let plan = random_faults(seed, weather(poses.len(), 300, u32::from(seed % 4 == 0)));
         let day = day(seed, plan.clone(), &poses);
         print(seed, &plan, &day);
         print_cause(&plan, &day);
         check(seed, &day, poses.len());
-    }
+    });
 }

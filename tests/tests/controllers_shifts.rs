@@ -47,7 +47,7 @@ fn worst(shifts_udeg: &[f64], seeds: std::ops::Range<u64>) -> f64 {
         .flat_map(|&udeg| seeds.clone().map(move |seed| (udeg, seed)))
         .map(|(udeg, seed)| {
             let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
-            let axis = Axis::BOTH[(seed / 2 % 2) as usize];
+            let axis = Axis::BOTH[((seed + seed / 2) % 2) as usize];
             (sign * udeg, seed, Arm::BOTH[(seed / 4 % 2) as usize], axis)
         })
         .collect();
@@ -72,7 +72,7 @@ fn no_shift_of_an_encoder_carries_a_kept_frame_beyond_the_limit() {
 #[ignore = "takes minutes; prints figures"]
 fn the_worst_of_many_shifts() {
     let shifts: Vec<f64> = (2..24).map(|i| f64::from(i) * 2e3).collect();
-    let worst_deg = worst(&shifts, 0..16);
+    let worst_deg = worst(&shifts, 0..8);
     println!("worst of all: {worst_deg:.4}°");
     assert!(worst_deg <= POINTING_LIMIT_DEG, "{worst_deg}");
 }

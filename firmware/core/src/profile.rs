@@ -97,12 +97,12 @@ pub struct Profile {
     /// Steps still to come, the next one among them.
     remaining: u64,
     /// p as planned, and as a stop has left it.
-    planned_ms: u64,
-    cruise_ms: u64,
-    ramp_ms: u64,
-    rise_ms: u64,
+    planned_ms: u32,
+    cruise_ms: u32,
+    ramp_ms: u32,
+    rise_ms: u32,
     /// Milliseconds summed up so far.
-    ms: u64,
+    ms: u32,
     /// The running sums: of jerk, and of that, acceleration and speed.
     slope: i64,
     speed: u64,
@@ -111,11 +111,11 @@ pub struct Profile {
     /// How much of the next step there is.
     part: u64,
     /// Steps left in this millisecond, when the next one is due, and their interval, 1/256 µs.
-    due: u64,
-    due_at: u64,
-    spacing: u64,
+    due: u32,
+    due_at: u32,
+    spacing: u32,
     /// Where in this millisecond the last period ended.
-    at: u64,
+    at: u32,
     interval: u32,
     is_step: bool,
 }
@@ -126,13 +126,14 @@ impl Profile {
         let steps = u64::from(steps.min(MAX_STEPS));
         let (cruise_ms, ramp_ms) = ramp.boxes(steps);
         let whole = cruise_ms * ramp_ms * ramp.rise_ms;
+        let [cruise_ms, ramp_ms, rise_ms] = [cruise_ms, ramp_ms, ramp.rise_ms].map(|ms| ms as u32);
         let mut profile = Self {
             steps,
             remaining: steps,
             planned_ms: cruise_ms,
             cruise_ms,
             ramp_ms,
-            rise_ms: ramp.rise_ms,
+            rise_ms,
             ms: 0,
             slope: 0,
             speed: 0,
@@ -142,7 +143,7 @@ impl Profile {
             due_at: 0,
             spacing: 0,
             // The millisecond before the first is over.
-            at: MS,
+            at: MS as u32,
             interval: 0,
             is_step: false,
         };
@@ -170,8 +171,8 @@ impl Profile {
         if self.ms < self.cruise_ms {
             self.cruise_ms = self.ms;
             // As many as the sums will still reach.
-            let will_give =
-                (2 * self.steps * self.cruise_ms + self.planned_ms) / (2 * self.planned_ms);
+            let [cruise_ms, planned_ms] = [self.cruise_ms, self.planned_ms].map(u64::from);
+            let will_give = (2 * self.steps * cruise_ms + planned_ms) / (2 * planned_ms);
             let given = self.steps - self.remaining;
             self.remaining = will_give.saturating_sub(given);
         }
@@ -187,43 +188,45 @@ impl Profile {
         let mut waited = 0;
         for _ in 0..LONGEST_PAUSE_MS {
             if self.due > 0 {
-                self.interval = (waited + self.due_at - self.at) as u32;
+                self.interval = waited + self.due_at - self.at;
                 self.is_step = true;
                 self.at = self.due_at;
                 self.due_at += self.spacing;
                 self.due -= 1;
                 return true;
             }
-            waited += MS - self.at;
+            waited += MS as u32 - self.at;
             self.at = 0;
             self.sum_up();
         }
-        self.interval = waited as u32;
+        self.interval = waited;
         self.is_step = false;
         true
     }
 
     /// A millisecond more of the folded boxes, and the steps in it.
+    #[inline(never)] // A step that is due already needs nothing of it.
     fn sum_up(&mut self) {
         let (p, r, j) = (self.cruise_ms, self.ramp_ms, self.rise_ms);
-        let past = |ms: u64| i64::from(self.ms >= ms);
+        let past = |ms: u32| i32::from(self.ms >= ms);
         let jerk = 1 - past(p) - past(r) - past(j) + past(p + r) + past(p + j) + past(r + j)
             - past(p + r + j);
         self.ms += 1;
-        self.slope += jerk;
+        self.slope += i64::from(jerk);
         self.speed = self.speed.saturating_add_signed(self.slope);
         let gain = self.steps * self.speed;
         let before = self.part;
         self.part += gain;
-        self.due = self.part / self.whole;
-        if self.due == 0 {
+        if self.part < self.whole {
             return;
         }
-        self.part -= self.due * self.whole;
+        let due = self.part / self.whole;
+        self.part -= due * self.whole;
+        self.due = due as u32;
         // Only times are cut to fewer bits; the sums stay whole.
         let shift = (u64::BITS - self.whole.leading_zeros()).saturating_sub(TIME_BITS);
         let per_ms = (gain >> shift).max(1);
-        let time_of = |sum: u64| ((sum >> shift) * MS / per_ms).min(MS);
+        let time_of = |sum: u64| ((sum >> shift) * MS / per_ms).min(MS) as u32;
         self.due_at = time_of(self.whole - before);
         self.spacing = time_of(self.whole);
     }
@@ -295,7 +298,7 @@ mod tests {
     fn extremes(mut profile: Profile, stop_after: u64) -> [f64; 3] {
         let (mut most, mut before) = ([0.0f64; 3], profile);
         for ms in 0..profile.planned_ms + profile.ramp_ms + profile.rise_ms {
-            if ms == stop_after {
+            if u64::from(ms) == stop_after {
                 profile.decelerate();
             }
             profile.sum_up();
@@ -317,7 +320,7 @@ mod tests {
         for _ in 0..400 {
             let (steps, [speed, acceleration, rise_ms]) = dice.run();
             let mut profile = Profile::new(steps, ramp(speed, acceleration, rise_ms)).unwrap();
-            let boxes = [profile.planned_ms, profile.ramp_ms, profile.rise_ms].map(|ms| ms as f64);
+            let boxes = [profile.planned_ms, profile.ramp_ms, profile.rise_ms].map(f64::from);
             let times = step_times(&mut profile);
             assert_eq!(times.len(), steps as usize);
             for (n, t) in (0..).zip(times) {
@@ -387,7 +390,7 @@ mod tests {
             let (steps, [speed, acceleration, rise_ms]) = dice.run();
             let profile = Profile::new(steps, ramp(speed, acceleration, rise_ms)).unwrap();
             let length = profile.planned_ms + profile.ramp_ms + profile.rise_ms;
-            let [v, a, jerk] = extremes(profile, dice.below(length));
+            let [v, a, jerk] = extremes(profile, dice.below(u64::from(length)));
             let most = 2.0 * acceleration as f64 / (rise_ms.max(1) as f64 * 1e-3);
             assert!(v <= 1.0001 * speed as f64 && a <= 1.0001 * acceleration as f64);
             assert!(
@@ -419,10 +422,10 @@ mod tests {
                 given += times.len() as u64;
                 t = times[times.len() - 1];
             }
-            let planned = profile.planned_ms as f64;
-            let expected = f64::from(steps) * profile.cruise_ms as f64 / planned;
+            let planned = f64::from(profile.planned_ms);
+            let expected = f64::from(steps) * f64::from(profile.cruise_ms) / planned;
             assert!((given as f64 - expected).abs() <= 0.5, "{given} {expected}");
-            assert!(t <= (profile.ramp_ms + profile.rise_ms) as f64 + 101.0);
+            assert!(t <= f64::from(profile.ramp_ms + profile.rise_ms) + 101.0);
         }
     }
 
