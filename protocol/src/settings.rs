@@ -2,14 +2,16 @@
 //!
 //! The defaults describe this axis: a 1.8° stepper at 8 microsteps on a 90:1 worm (1600 · 90 =
 //! 144,000 steps a turn, 0.0025° a step) with an 18-bit absolute ring encoder on the output shaft
-//! (0.00137° a count). 15°/s is 225 rpm of the motor, and 30°/s² on an arm of 10 kg·m² needs 5.2 N·m
-//! at the shaft, 0.12 N·m at the motor through a worm of 50 % efficiency: a tenth of what a common
-//! 1.2 N·m NEMA 23 motor holds, so that the arm and not the motor limits the ramp.
+//! (0.00137° a count). 15°/s is 225 rpm of the motor, and 90°/s² on an arm of 10 kg·m² needs 15.7 N·m
+//! at the shaft, 0.35 N·m at the motor through a worm of 50 % efficiency: a third of what a common
+//! 1.2 N·m NEMA 23 motor holds, so that the arm and not the motor limits the ramp. Acceleration and rise
+//! are those with the shortest settled moves over arms that swing at 6 Hz to 16 Hz (`gonia chart
+//! --motion`).
 
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 26;
+pub const N_SETTINGS: usize = 30;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -81,7 +83,7 @@ pub enum Key {
     /// Time between telemetry while moving, µs; 0 for none. Of the node: both axes share it.
     Telemetry = 20,
     /// How far steps and encoder, both counted from home, may disagree at rest, µdeg. More means that
-    /// one of both is wrong, and only the home switch can tell which.
+    /// one of both is wrong, and only the home switch can tell which. Calibrating makes it narrower.
     StepsDisagree = 21,
     /// Error map of the encoder (see `gonia_firmware::error_map`): cosine, once a turn, µdeg.
     EncoderCos1 = 22,
@@ -91,6 +93,15 @@ pub enum Key {
     EncoderCos2 = 24,
     /// Sine, twice a turn, µdeg.
     EncoderSin2 = 25,
+    /// How long acceleration takes to build up and to die down, µs: jerk is acceleration / rise. 0 for a
+    /// trapezoid of speed. Near the period of the arm's swing it keeps the arm from swinging.
+    AccelerationRise = 26,
+    /// The worm's turn at the shaft, µdeg: the period of the gear's error.
+    WormTurn = 27,
+    /// Error of the gear: how far the shaft is ahead of the steps, cosine, once a turn of the worm, µdeg.
+    GearCos = 28,
+    /// Sine of the same, µdeg.
+    GearSin = 29,
 }
 
 /// What a key means.
@@ -161,7 +172,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "home_tolerance",
         "µdeg",
         (1000, 170 * DEG),
-        [20_000; 2],
+        [15_000; 2],
     ),
     m(
         Key::MaxSpeed,
@@ -175,7 +186,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         "acceleration",
         "µdeg/s²",
         (100_000, 1000 * DEG),
-        [30 * DEG; 2],
+        [90 * DEG; 2],
     ),
     m(
         Key::HomeFastSpeed,
@@ -260,9 +271,25 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     map(Key::EncoderSin1, "encoder_sin1"),
     map(Key::EncoderCos2, "encoder_cos2"),
     map(Key::EncoderSin2, "encoder_sin2"),
+    m(
+        Key::AccelerationRise,
+        "acceleration_rise",
+        "µs",
+        (0, 1_000_000),
+        [125_000; 2],
+    ),
+    m(
+        Key::WormTurn,
+        "worm_turn",
+        "µdeg",
+        (10_000, 360 * DEG),
+        [4 * DEG; 2],
+    ),
+    map(Key::GearCos, "gear_cos"),
+    map(Key::GearSin, "gear_sin"),
 ];
 
-/// An amplitude of the encoder's error map.
+/// An amplitude of an error.
 const fn map(key: Key, name: &'static str) -> Meaning {
     m(key, name, "µdeg", (-500_000, 500_000), [0; 2])
 }
@@ -292,6 +319,9 @@ impl Key {
         Key::EncoderCos2,
         Key::EncoderSin2,
     ];
+
+    /// The keys of a gear's error map.
+    pub const GEAR_MAP: [Key; 3] = [Key::WormTurn, Key::GearCos, Key::GearSin];
 
     /// The key of a number, if there is one.
     pub fn from_number(number: u8) -> Option<Self> {

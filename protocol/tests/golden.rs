@@ -6,7 +6,7 @@
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::frame::{Decoder, encode};
 use gonia_protocol::message::*;
-use gonia_protocol::settings::Axis;
+use gonia_protocol::settings::{Axis, MEANINGS};
 use gonia_protocol::{NODE_LIGHT, SCHEMA_KEY, crc32c};
 
 const REQUEST: u16 = 0x0102;
@@ -223,4 +223,50 @@ fn the_schema_key_is_that_of_the_golden_bytes() {
         "{:#010x}",
         crc32c(all.as_bytes())
     );
+}
+
+/// Settings are known by their numbers, on the wire and in flash: new ones come at the end.
+#[test]
+fn no_setting_has_ever_changed_its_number_or_its_unit() {
+    let listed: Vec<String> = MEANINGS
+        .iter()
+        .map(|m| {
+            format!("{} {} {}", m.key.number(), m.name, m.unit)
+                .trim_end()
+                .to_owned()
+        })
+        .collect();
+    let frozen = [
+        "0 steps_per_turn steps",
+        "1 encoder_counts_per_turn counts",
+        "2 encoder_zero counts",
+        "3 soft_min µdeg",
+        "4 soft_max µdeg",
+        "5 home_angle µdeg",
+        "6 home_tolerance µdeg",
+        "7 max_speed µdeg/s",
+        "8 acceleration µdeg/s²",
+        "9 home_fast_speed µdeg/s",
+        "10 home_slow_speed µdeg/s",
+        "11 home_backoff µdeg",
+        "12 backlash_takeup µdeg",
+        "13 deadband µdeg",
+        "14 settle_window µs",
+        "15 settle_patience µs",
+        "16 max_corrections",
+        "17 following_limit µdeg",
+        "18 trigger_window µdeg",
+        "19 lease µs",
+        "20 telemetry µs",
+        "21 steps_disagree µdeg",
+        "22 encoder_cos1 µdeg",
+        "23 encoder_sin1 µdeg",
+        "24 encoder_cos2 µdeg",
+        "25 encoder_sin2 µdeg",
+        "26 acceleration_rise µs",
+        "27 worm_turn µdeg",
+        "28 gear_cos µdeg",
+        "29 gear_sin µdeg",
+    ];
+    assert_eq!(listed, frozen);
 }

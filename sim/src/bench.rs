@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn both_axes_keep_their_profile_at_the_highest_step_rate() {
-        let ramp = Ramp::new(STEPS_S * 2_500, 300_000_000, 144_000);
+        let ramp = Ramp::new(STEPS_S * 2_500, 300_000_000, 50_000, 144_000);
         let steps = 60_000;
         let mut profile = Profile::new(steps, ramp).unwrap();
         let mut ticks = u64::from(profile.interval());

@@ -15,6 +15,9 @@ pub mod bench;
 pub mod plant;
 pub mod swing;
 
+/// The steps of a run, as the controllers give them.
+pub use gonia_firmware::profile;
+
 #[cfg(feature = "std")]
 pub mod fault;
 #[cfg(feature = "std")]

@@ -59,7 +59,7 @@ impl PlantConfig {
     ///
     /// Play 0.015° and gear error ±0.003° are those of a good worm stage (54 and 11 arc seconds).
     /// The arm swings at 10 Hz, as one of 10 kg·m² does on a gear of 40 kN·m/rad, and 8 % damping let
-    /// it die down in 0.2 s; 30°/s² bend it by 30/(2π·10)² = 0.0076°. Pull-out at 600 rpm of the
+    /// it die down in 0.2 s; 90°/s² bend it by 90/(2π·10)² = 0.023°. Pull-out at 600 rpm of the
     /// motor. Noise of half a count, and 0.004° of eccentricity left after calibration, which a
     /// 70 mm ring has at 2.5 µm off centre.
     pub fn worm_axis(home_udeg: f64, start_udeg: f64) -> Self {

@@ -1,1 +1,10 @@
-//! Whole-system tests live in `tests/`.
+//! Whole-system tests live in `tests/`; here is what several of them need.
+//!
+//! | room | subject |
+//! |---|---|
+//! | [`poses`] | lists of poses, and how far an arm truly was from one |
+//! | [`calibrated`] | a rig whose encoders sit off their axes and were calibrated at the bench |
+#![allow(clippy::unwrap_used)]
+
+pub mod calibrated;
+pub mod poses;

@@ -7,11 +7,11 @@ use gonia::capture::{
     Arms, POINTING_LIMIT_DEG, SETTLE_TIME_S, SessionSummary, Shot, ShotOutcome, move_time_s,
     nearest_turn_deg, run_session,
 };
-use gonia_brdf::direction::angle_between;
-use gonia_brdf::{Direction, Pose};
+use gonia_brdf::Pose;
 use gonia_protocol::settings::Axis;
 use gonia_sim::fault::{Arm, FaultPlan, WireFaults};
 use gonia_sim::rig::SimRig;
+use gonia_tests::poses::{of_the_paper, scattered, true_error_deg};
 
 /// What a session brought, and where the arms truly were at each kept shot.
 struct Session {
@@ -42,28 +42,9 @@ fn run(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Session {
     }
 }
 
-/// Poses all over the hemisphere, with steps of every size and both signs.
-fn poses(n: usize) -> Vec<Pose> {
-    (0..n)
-        .map(|i| {
-            let f = i as f64;
-            Pose {
-                light: Direction::from_deg((f * 23.0) % 86.0, f * 47.0),
-                view: Direction::from_deg((f * 11.0) % 76.0, 360.0 - f * 15.0),
-            }
-        })
-        .collect()
-}
-
-/// The largest angle between commanded and true directions of light and view, degrees.
-fn true_error_deg(commanded: &Pose, truth: &Pose) -> f64 {
-    let angle = |a: Direction, b: Direction| angle_between(a.to_vec3(), b.to_vec3()).to_degrees();
-    angle(commanded.light, truth.light).max(angle(commanded.view, truth.view))
-}
-
 #[test]
 fn every_pose_of_a_good_day_is_kept_and_truly_there() {
-    let poses = poses(150);
+    let poses = scattered(150);
     let session = run(7, FaultPlan::default(), &poses);
     assert_eq!(session.refused, Vec::<String>::new());
     assert_eq!(session.shots.len(), poses.len());
@@ -93,7 +74,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
         },
         ..FaultPlan::default()
     };
-    let poses = poses(10);
+    let poses = scattered(10);
     let traces: Vec<u64> = [1, 1, 2]
         .map(|seed| run(seed, faults(), &poses).rig.trace())
         .to_vec();
@@ -101,52 +82,12 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     assert_ne!(traces[0], traces[2]);
 }
 
-/// The paper's directions: rings of θ with equal steps in φ, every second ring backwards.
-fn rings(rings: &[(f64, usize)]) -> Vec<Direction> {
-    let mut directions = Vec::new();
-    for (i, &(theta, n)) in rings.iter().enumerate() {
-        let mut ring: Vec<_> = (0..n)
-            .map(|k| Direction::from_deg(theta, 360.0 / n as f64 * k as f64))
-            .collect();
-        if i % 2 == 1 {
-            ring.reverse();
-        }
-        directions.extend(ring);
-    }
-    directions
-}
-
-/// The paper's 8505 poses: for each view all lights, to and fro.
-fn papers_poses() -> Vec<Pose> {
-    let sattler = [
-        (0.0, 1),
-        (15.0, 6),
-        (30.0, 12),
-        (45.0, 18),
-        (60.0, 20),
-        (75.0, 24),
-    ];
-    let views = rings(&sattler);
-    let mut lights = rings(&[&sattler[..], &[(85.0, 24)]].concat());
-    let mut poses = Vec::new();
-    for view in views {
-        poses.extend(lights.iter().map(|&light| Pose { light, view }));
-        lights.reverse();
-    }
-    poses
-}
-
-#[test]
-fn the_papers_poses_are_8505() {
-    assert_eq!(papers_poses().len(), 8505);
-}
-
 /// Figures for docs/results.md: `cargo test --release -p gonia-tests --test controllers_session --
 /// --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute; prints figures"]
 fn material_and_reference_of_the_papers_plan_are_measured() {
-    let mut poses = papers_poses();
+    let mut poses = of_the_paper();
     poses.extend(poses.clone());
     let began = std::time::Instant::now();
     let session = run(1, FaultPlan::default(), &poses);
@@ -172,7 +113,7 @@ fn material_and_reference_of_the_papers_plan_are_measured() {
 
 #[test]
 fn the_planners_times_are_those_of_the_arms() {
-    let poses = poses(60);
+    let poses = scattered(60);
     let session = run(3, FaultPlan::default(), &poses);
     let triggers = session.rig.triggers();
     let mut predicted_s = 0.0;

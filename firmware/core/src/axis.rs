@@ -4,7 +4,7 @@ use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::AxisStatus;
 use gonia_protocol::settings::{Axis, Key};
 
-use crate::error_map::ErrorMap;
+use crate::error_map::{ErrorMap, GearMap};
 use crate::hardware::Hardware;
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
 use crate::settings::Settings;
@@ -41,6 +41,7 @@ pub struct AxisDrive {
     base_udeg: i64,
     /// Steps and encoder at home.
     home: Option<(i64, i64)>,
+    gear: GearMap,
     steps_per_turn: i64,
     encoder: Encoder,
     following_udeg: i32,
@@ -85,6 +86,7 @@ impl AxisDrive {
             base_steps: 0,
             base_udeg: 0,
             home: None,
+            gear: GearMap::new(axis, settings),
             steps_per_turn: i64::from(settings.get(axis, Key::StepsPerTurn)),
             encoder: Encoder {
                 map: ErrorMap::new(axis, settings),
@@ -112,10 +114,16 @@ impl AxisDrive {
         self.encoder.udeg
     }
 
-    /// Where the steps say it is, counted from where the encoder was when the run began, µdeg.
+    /// Where the steps say it is, µdeg: counted from home, or, where that is not known, from where the
+    /// encoder was when the run began.
     pub fn commanded_udeg(&self) -> i32 {
-        let turned = (self.steps - self.base_steps) * TURN_UDEG / self.steps_per_turn;
-        (self.base_udeg + turned) as i32
+        let (steps, udeg) = self.home.unwrap_or((self.base_steps, self.base_udeg));
+        (udeg + self.turned_udeg(steps)) as i32
+    }
+
+    /// How far the steps have turned the axis since there were so many, µdeg.
+    fn turned_udeg(&self, since_steps: i64) -> i64 {
+        (self.steps - since_steps) * TURN_UDEG / self.steps_per_turn
     }
 
     /// For people.
@@ -157,7 +165,14 @@ impl AxisDrive {
                 push(interval / 2, End::Turn(self.forward));
                 ticks -= interval / 2;
             }
-            push(ticks, End::Step);
+            push(
+                ticks,
+                if profile.is_step() {
+                    End::Step
+                } else {
+                    End::Rest
+                },
+            );
             self.is_playing = true;
             if !profile.advance() {
                 let next = self.take_up.take();
@@ -228,7 +243,8 @@ impl AxisDrive {
 
     /// Compares steps and encoder: the error and whether it is within its limit.
     pub fn is_following(&mut self, settings: &Settings) -> bool {
-        let error = self.commanded_udeg() - self.encoder.udeg;
+        let run_udeg = (self.base_udeg + self.turned_udeg(self.base_steps)) as i32;
+        let error = run_udeg - self.encoder.udeg;
         self.following_udeg = self.following_udeg.max(error.saturating_abs());
         error.saturating_abs() <= settings.get(self.axis, Key::FollowingLimit)
     }
@@ -302,17 +318,23 @@ impl AxisDrive {
         Ok(())
     }
 
-    /// The axis rests at home: steps and encoder count from here.
-    pub fn count_from_home(&mut self) {
-        self.home = Some((self.steps, i64::from(self.encoder.udeg)));
+    /// Home is no longer known.
+    pub fn forget_home(&mut self) {
+        self.home = None;
     }
 
-    /// How far the encoder is ahead of the steps, both counted from home, µdeg. At rest, come to from
-    /// below, the gear's error and the encoder's are all that is in it.
-    pub fn disagreement_udeg(&self) -> i64 {
-        self.home.map_or(0, |(steps, udeg)| {
-            let turned = (self.steps - steps) * TURN_UDEG / self.steps_per_turn;
-            i64::from(self.encoder.udeg) - udeg - turned
+    /// The axis rests at home, by the mean of many readings here: steps and encoder count from this.
+    pub fn count_from_home(&mut self, encoder_udeg: i64) {
+        self.home = Some((self.steps, encoder_udeg));
+    }
+
+    /// How far the encoder, which says this in the mean, is ahead of the steps, both counted from home,
+    /// µdeg. At rest, come to from below, what is left of the gear's error and of the encoder's is all
+    /// that is in it.
+    pub fn disagreement_udeg(&self, encoder_udeg: i64) -> i64 {
+        self.home.map_or(0, |(steps, home_udeg)| {
+            let gear = self.gear.ahead_udeg(encoder_udeg) - self.gear.ahead_udeg(home_udeg);
+            encoder_udeg - home_udeg - self.turned_udeg(steps) - gear
         })
     }
 
@@ -321,6 +343,7 @@ impl AxisDrive {
         Ramp::new(
             settings.get_u64(self.axis, speed),
             settings.get_u64(self.axis, Key::Acceleration),
+            settings.get_u64(self.axis, Key::AccelerationRise),
             self.steps_per_turn.unsigned_abs(),
         )
     }
@@ -334,6 +357,7 @@ impl AxisDrive {
     pub fn apply(&mut self, settings: &Settings) {
         self.steps_per_turn = i64::from(settings.get(self.axis, Key::StepsPerTurn));
         self.encoder.map = ErrorMap::new(self.axis, settings);
+        self.gear = GearMap::new(self.axis, settings);
         self.encoder.zero = i64::from(settings.get(self.axis, Key::EncoderZero));
         self.home = None;
         self.rebase();

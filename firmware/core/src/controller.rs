@@ -290,6 +290,7 @@ impl Controller {
         self.homed = false;
         for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
             drive.clear_following();
+            drive.forget_home();
             let closed = hardware.home_switch_closed(drive.axis());
             *homing = Some(Homing::begin(closed));
         }
@@ -404,6 +405,7 @@ impl Controller {
             key,
             Key::StepsPerTurn | Key::EncoderCountsPerTurn | Key::EncoderZero | Key::HomeAngle
         ) || Key::ERROR_MAP.contains(&key)
+            || Key::GEAR_MAP.contains(&key)
         {
             self.homed = false;
             self.enter(State::Unhomed, now_us);
@@ -507,8 +509,11 @@ impl Controller {
         }
         if self.homing.iter().flatten().all(Homing::is_done) {
             self.homed = true;
-            self.homing = [None; 2];
-            self.drives.iter_mut().for_each(AxisDrive::count_from_home);
+            for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
+                if let Some(homing) = homing.take() {
+                    drive.count_from_home(homing.rest_udeg());
+                }
+            }
             self.target_udeg = Axis::BOTH.map(|axis| self.settings.get(axis, Key::SoftMin));
             self.enter(State::Idle, now_us);
             self.complete(Outcome::Done);
@@ -545,11 +550,13 @@ impl Controller {
 
     /// The first axis whose steps and encoder tell of different places.
     fn axis_in_disagreement(&self) -> Option<Axis> {
-        let disagrees = |drive: &&AxisDrive| {
-            let limit = self.settings.get(drive.axis(), Key::StepsDisagree);
-            drive.disagreement_udeg().abs() > i64::from(limit)
-        };
-        self.drives.iter().find(disagrees).map(AxisDrive::axis)
+        Axis::BOTH.into_iter().find(|&axis| {
+            let i = axis.index();
+            let mean_udeg = self.settle[i].as_ref().map_or(0, Settle::mean_udeg);
+            let encoder_udeg = i64::from(self.target_udeg[i]) + mean_udeg;
+            let limit = i64::from(self.settings.get(axis, Key::StepsDisagree));
+            self.drives[i].disagreement_udeg(encoder_udeg).abs() > limit
+        })
     }
 
     /// One axis after its run: whether it has reached its target, up to now.

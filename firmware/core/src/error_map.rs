@@ -1,4 +1,4 @@
-//! The encoder's error over a turn, and its removal.
+//! The encoder's error over a turn, and its removal; the gear's error over a turn of the worm.
 //!
 //! A ring that sits off its axis by e at radius r reads wrong by e/r once a turn (2.5 µm on a 70 mm
 //! ring: 0.004°; 30 µm: 0.05°), a tilted or oval one twice a turn. No reading of the encoder itself
@@ -40,14 +40,49 @@ impl ErrorMap {
 
     /// How much too high the encoder reads at this place on the ring (2³² a turn), µdeg.
     pub fn error_udeg(&self, place: u32) -> i32 {
-        let mut sum = 0;
-        for (harmonic, (cos, sin)) in (1u32..).zip(self.cos.into_iter().zip(self.sin)) {
-            let place = place.wrapping_mul(harmonic);
-            sum += i64::from(cos) * i64::from(sine(place.wrapping_add(1 << PLACE_BITS)));
-            sum += i64::from(sin) * i64::from(sine(place));
-        }
-        ((sum + (1 << (SINE_BITS - 1))) >> SINE_BITS) as i32
+        let harmonics = (1u32..).zip(self.cos.into_iter().zip(self.sin));
+        let terms = harmonics.map(|(n, (cos, sin))| wave(cos, sin, place.wrapping_mul(n)));
+        rounded(terms.sum())
     }
+}
+
+/// How far the shaft is ahead of the motor: a worm that runs out of true carries it to and fro, once
+/// a turn of the worm. It is no error of pointing, as the encoder sits on the shaft; but it is the
+/// greater part of what steps and encoder differ by when all is well.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GearMap {
+    worm_turn_udeg: i64,
+    cos: i32,
+    sin: i32,
+}
+
+impl GearMap {
+    /// The map in the settings; nothing where the gear was never calibrated.
+    pub fn new(axis: Axis, settings: &Settings) -> Self {
+        let get = |key| settings.get(axis, key);
+        Self {
+            worm_turn_udeg: i64::from(get(Key::WormTurn)),
+            cos: get(Key::GearCos),
+            sin: get(Key::GearSin),
+        }
+    }
+
+    /// How far it is ahead at an angle of the shaft, µdeg.
+    pub fn ahead_udeg(&self, shaft_udeg: i64) -> i64 {
+        let turned = shaft_udeg.rem_euclid(self.worm_turn_udeg);
+        let place = ((turned << 32) / self.worm_turn_udeg) as u32;
+        i64::from(rounded(wave(self.cos, self.sin, place)))
+    }
+}
+
+/// `cos`·cos + `sin`·sin at a place (2³² a period), with [`SINE_BITS`] fraction bits.
+fn wave(cos: i32, sin: i32, place: u32) -> i64 {
+    i64::from(cos) * i64::from(sine(place.wrapping_add(1 << PLACE_BITS)))
+        + i64::from(sin) * i64::from(sine(place))
+}
+
+fn rounded(value: i64) -> i32 {
+    ((value + (1 << (SINE_BITS - 1))) >> SINE_BITS) as i32
 }
 
 /// Sine of 2π · `place` / 2³², with [`SINE_BITS`] fraction bits.
@@ -119,6 +154,20 @@ mod tests {
 
     fn cos(x: f64) -> f64 {
         sin(x + core::f64::consts::FRAC_PI_2)
+    }
+
+    #[test]
+    fn a_gears_error_comes_again_with_every_turn_of_its_worm() {
+        let map = GearMap {
+            worm_turn_udeg: 4_000_000,
+            cos: 1_000,
+            sin: -3_000,
+        };
+        for turn in [-40, -1, 0, 17] {
+            let at = |udeg: i64| map.ahead_udeg(turn * 4_000_000 + udeg);
+            assert_eq!([at(0), at(1_000_000)], [1_000, -3_000]);
+            assert_eq!([at(2_000_000), at(3_000_000)], [-1_000, 3_000]);
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ const DEBOUNCE: u8 = 3;
 /// The slow way off the switch is this part of the fast search's speed.
 const CLEARING_SLOWDOWN: u64 = 4;
 /// Patiences of settling until an arm has swung out.
-const SWING_OUT: u64 = 3;
+const SWING_OUT: u64 = 2;
 /// How many back-offs below the switch an axis may stand at the start.
 const MAX_BELOW: i64 = 10;
 
@@ -38,8 +38,12 @@ enum Phase {
     Approach,
     /// Home is known; on to the lowest admissible angle.
     Park,
-    /// Until the arm has swung out: steps and encoder are compared from here on.
+    /// Until the arm has swung out.
     Rest {
+        until_us: u64,
+    },
+    /// For another patience the encoder is read: steps and encoder are compared from here on.
+    Read {
         until_us: u64,
     },
     Done,
@@ -51,6 +55,9 @@ pub struct Homing {
     phase: Phase,
     same_readings: u8,
     last_reading: bool,
+    /// Of the encoder at rest.
+    rest_sum: i64,
+    rest_count: i64,
 }
 
 impl Homing {
@@ -60,7 +67,14 @@ impl Homing {
             phase: Phase::Look,
             same_readings: 1,
             last_reading: switch_closed,
+            rest_sum: 0,
+            rest_count: 0,
         }
+    }
+
+    /// Where the axis rests, by the mean of its encoder, µdeg.
+    pub fn rest_udeg(&self) -> i64 {
+        self.rest_sum / self.rest_count.max(1)
     }
 
     /// Whether this axis is home and at rest.
@@ -126,7 +140,18 @@ impl Homing {
                 let until_us = now_us + SWING_OUT * patience_us;
                 self.phase = Phase::Rest { until_us };
             }
-            Phase::Rest { until_us } if now_us >= until_us => self.phase = Phase::Done,
+            Phase::Rest { until_us } if now_us >= until_us => {
+                let patience_us = settings.get_u64(drive.axis(), Key::SettlePatience);
+                let until_us = now_us + patience_us;
+                self.phase = Phase::Read { until_us };
+            }
+            Phase::Read { until_us } => {
+                self.rest_sum += i64::from(drive.encoder_udeg());
+                self.rest_count += 1;
+                if now_us >= until_us {
+                    self.phase = Phase::Done;
+                }
+            }
             _ => {}
         }
         Ok(())
@@ -134,8 +159,10 @@ impl Homing {
 
     fn clear(&mut self, drive: &mut AxisDrive, settings: &Settings) {
         let get = |key| i64::from(settings.get(drive.axis(), key));
-        // What the fast search ran past the switch: v²/2a.
-        let overrun = get(Key::HomeFastSpeed).pow(2) / (2 * get(Key::Acceleration)).max(1);
+        // What the fast search ran past the switch: v²/2a, and half the rise at full speed.
+        let speed = get(Key::HomeFastSpeed);
+        let overrun = speed.pow(2) / (2 * get(Key::Acceleration)).max(1)
+            + speed * get(Key::AccelerationRise) / 2_000_000;
         let way = overrun + MAX_BELOW * get(Key::HomeBackoff);
         drive.run(drive.steps_of(way), clearing_ramp(drive, settings));
         self.same_readings = 0;
@@ -157,6 +184,7 @@ fn clearing_ramp(drive: &AxisDrive, settings: &Settings) -> crate::profile::Ramp
     crate::profile::Ramp::new(
         settings.get_u64(drive.axis(), Key::HomeFastSpeed) / CLEARING_SLOWDOWN,
         settings.get_u64(drive.axis(), Key::Acceleration),
+        settings.get_u64(drive.axis(), Key::AccelerationRise),
         settings.get_u64(drive.axis(), Key::StepsPerTurn),
     )
 }

@@ -20,6 +20,9 @@ const MAX_EVALUATIONS: u32 = 50;
 pub struct Settle {
     limits: Limits,
     inside_since_us: u64,
+    /// Of the readings since then.
+    inside_sum: i64,
+    inside_count: i64,
     evaluation_us: u64,
     last_outside_us: Option<u64>,
     error_sum: i64,
@@ -46,6 +49,8 @@ impl Settle {
         Self {
             limits,
             inside_since_us: now_us,
+            inside_sum: 0,
+            inside_count: 0,
             evaluation_us: now_us,
             last_outside_us: None,
             error_sum: 0,
@@ -58,9 +63,14 @@ impl Settle {
     pub fn reading(&mut self, now_us: u64, error_udeg: i32) -> Verdict {
         if error_udeg.unsigned_abs() > self.limits.deadband_udeg.unsigned_abs() {
             self.inside_since_us = now_us;
+            (self.inside_sum, self.inside_count) = (0, 0);
             self.last_outside_us = Some(now_us);
-        } else if now_us - self.inside_since_us >= self.limits.window_us {
-            return Verdict::Reached;
+        } else {
+            self.inside_sum += i64::from(error_udeg);
+            self.inside_count += 1;
+            if now_us - self.inside_since_us >= self.limits.window_us {
+                return Verdict::Reached;
+            }
         }
         let half = self.evaluation_us + self.limits.patience_us / 2;
         if now_us >= half {
@@ -71,6 +81,11 @@ impl Settle {
             return Verdict::Wait;
         }
         self.evaluate(now_us, half)
+    }
+
+    /// Mean error since it has been within the deadband, µdeg.
+    pub fn mean_udeg(&self) -> i64 {
+        self.inside_sum / self.inside_count.max(1)
     }
 
     /// Ringing has had its time: judges the second half of it.

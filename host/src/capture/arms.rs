@@ -6,6 +6,7 @@ use gonia_protocol::message::{Arm, MAX_PULSES, Outcome, Refusal, State, Trigger}
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
+use super::keep_out::{self, Pair};
 use super::timing::nearest_turn_deg;
 use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport, is_uncalibrated};
 
@@ -160,8 +161,10 @@ impl Arms {
         Ok(())
     }
 
-    /// No pose is taken whose light and view are nearer to each other than this, degrees: on rigs whose
-    /// arms can touch. 0, the default, for arms that pass each other at different distances.
+    /// No pose is taken whose light and view are nearer to each other than this, degrees, and on no way
+    /// from pose to pose do they come nearer, whichever arm is late: on rigs whose arms can touch. 0,
+    /// the default, for arms that pass each other at different distances. Homing is not watched: before
+    /// it nobody knows where the arms are.
     pub fn set_keep_out_deg(&mut self, keep_out_deg: f64) {
         self.keep_out_deg = keep_out_deg;
     }
@@ -200,19 +203,74 @@ impl Arms {
     }
 
     /// The axis angles for a pose, µdeg: light and camera, θ and φ, φ the shortest way from where
-    /// the arms are. `None` if φ has no turn within the limits.
+    /// the arms are, or another turn of it where the other arm is in that way. `None` if φ has no turn
+    /// within the limits.
     pub(super) fn targets_udeg(&self, pose: &Pose) -> Option<[[i32; 2]; 2]> {
-        let mut targets = [[0; 2]; 2];
+        let mut turns = [[None; 3]; 2];
         for (i, direction) in [pose.light, pose.view].into_iter().enumerate() {
             let from_deg = f64::from(self.at_udeg[i][1]) * 1e-6;
-            let phi_deg = nearest_turn_deg(from_deg, direction.phi_deg(), self.phi_limits_deg[i])?;
-            targets[i] = [direction.theta_deg(), phi_deg].map(|deg| (deg * 1e6).round() as i32);
+            let limits_deg = self.phi_limits_deg[i];
+            let nearest_deg = nearest_turn_deg(from_deg, direction.phi_deg(), limits_deg)?;
+            turns[i] = [0.0, 360.0, -360.0].map(|turn_deg| {
+                let phi_deg = nearest_deg + turn_deg;
+                let is_within =
+                    turn_deg == 0.0 || (limits_deg[0]..=limits_deg[1]).contains(&phi_deg);
+                let target = [direction.theta_deg(), phi_deg].map(|deg| (deg * 1e6).round() as i32);
+                is_within.then_some(target)
+            });
         }
-        Some(targets)
+        let nearest = [turns[0][0]?, turns[1][0]?];
+        if self.keep_out_deg <= 0.0 {
+            return Some(nearest);
+        }
+        let ways = turns[1].iter().flatten().flat_map(|camera| {
+            turns[0]
+                .iter()
+                .flatten()
+                .map(move |light| [*light, *camera])
+        });
+        let mut clear = ways.filter(|targets| self.legs_udeg(*targets).is_some());
+        // None: `go` will say so.
+        Some(clear.next().unwrap_or(nearest))
+    }
+
+    /// The legs of a way to these targets that is clear of the keep-out angle, if there is one.
+    fn legs_udeg(&self, targets_udeg: [[i32; 2]; 2]) -> Option<Vec<[[i32; 2]; 2]>> {
+        if self.keep_out_deg <= 0.0 {
+            return Some(vec![targets_udeg]);
+        }
+        let deg = |pair: [[i32; 2]; 2]| pair.map(|axes| axes.map(|udeg| f64::from(udeg) * 1e-6));
+        let udeg = |pair: Pair| pair.map(|axes| axes.map(|deg| (deg * 1e6).round() as i32));
+        let legs = keep_out::way(&deg(self.at_udeg), &deg(targets_udeg), self.keep_out_deg)?;
+        Some(legs.into_iter().map(udeg).collect())
     }
 
     /// Moves both arms, waits until both are at rest, triggers, and collects the latches.
     pub(super) fn shoot(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Try, LinkError> {
+        match self.go(targets_udeg)? {
+            Some(tried) => Ok(tried),
+            None => self.trigger(),
+        }
+    }
+
+    /// Moves both arms, clear of each other, and waits until both are at rest; what went wrong, if
+    /// anything did.
+    pub(super) fn go(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
+        let Some(legs) = self.legs_udeg(targets_udeg) else {
+            let angle = self.keep_out_deg;
+            let reason = format!("no way there keeps the arms {angle:.1}° apart");
+            return Ok(Some(Try::Again(reason)));
+        };
+        for leg in legs {
+            if let Some(tried) = self.go_straight(leg)? {
+                return Ok(Some(tried));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A single leg.
+    fn go_straight(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
         let mut tickets = [None; 2];
         for ((controller, target), ticket) in
             self.both().into_iter().zip(targets_udeg).zip(&mut tickets)
@@ -222,10 +280,10 @@ impl Arms {
         self.at_udeg = targets_udeg;
         for outcome in self.wait_for(tickets, MOVE_LIMIT_US)?.into_iter().flatten() {
             if outcome != Outcome::Done {
-                return Ok(ended_badly("a move", outcome));
+                return Ok(Some(ended_badly("a move", outcome)));
             }
         }
-        self.trigger()
+        Ok(None)
     }
 
     fn trigger(&mut self) -> Result<Try, LinkError> {
@@ -350,11 +408,19 @@ impl Arms {
         [&mut self.light, &mut self.camera]
     }
 
+    /// Where the arms are, or rather the nearest places that they may be sent to: an arm parks at its
+    /// lowest angle, give or take the deadband.
     fn positions_udeg(&mut self) -> Result<[[i32; 2]; 2], LinkError> {
         let mut at = [[0; 2]; 2];
         for (controller, at) in self.both().into_iter().zip(&mut at) {
             let axes = controller.status()?.axes;
             *at = axes.map(|axis| axis.encoder_udeg);
+            for axis in Axis::BOTH {
+                let low = controller.setting(axis, Key::SoftMin)?;
+                let high = controller.setting(axis, Key::SoftMax)?;
+                let at = &mut at[axis.index()];
+                *at = (*at).max(low).min(high);
+            }
         }
         Ok(at)
     }

@@ -1,6 +1,7 @@
 //! A session: both arms to every pose, a trigger, and the encoders latched with it.
 
 mod arms;
+pub mod keep_out;
 mod session;
 mod timing;
 

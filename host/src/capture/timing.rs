@@ -12,16 +12,20 @@ pub const SETTLE_TIME_S: f64 = 0.25;
 
 /// Time of a move of one axis between two *axis* angles (φ not wrapped), seconds, without settling.
 ///
-/// A trapezoid of speed, d/v + v/a, or 2·√(d/a) where full speed is not reached. A move downwards
-/// goes past its target by the backlash take-up and comes back up.
+/// The firmware's three boxes folded, p + r + j: d/v at full speed, v/a for the ramps, and the rise of
+/// acceleration; where full speed is not reached, p = r + j and d = a·p·r (`gonia_firmware::profile`).
+/// A move downwards goes past its target by the backlash take-up and comes back up.
 pub fn move_time_s(axis: Axis, from_deg: f64, to_deg: f64) -> f64 {
     let value = |key: Key| f64::from(key.default_of(axis)) * 1e-6;
     let (speed, acceleration) = (value(Key::MaxSpeed), value(Key::Acceleration));
+    let rise = value(Key::AccelerationRise);
     let run = |way: f64| {
-        if way >= speed * speed / acceleration {
-            way / speed + speed / acceleration
+        if way <= 0.0 {
+            0.0
+        } else if way / speed >= speed / acceleration + rise {
+            way / speed + speed / acceleration + rise
         } else {
-            2.0 * (way / acceleration).sqrt()
+            rise + (rise * rise + 4.0 * way / acceleration).sqrt()
         }
     };
     let way = to_deg - from_deg;
@@ -50,12 +54,16 @@ mod tests {
     const LIMITS: [f64; 2] = [-185.0, 545.0];
 
     #[test]
-    fn a_move_takes_the_time_of_its_trapezoid() {
-        assert!((move_time_s(Axis::Theta, 0.0, 15.0) - 1.5).abs() < 1e-9);
-        assert!((move_time_s(Axis::Phi, 0.0, 0.3) - 0.2).abs() < 1e-9);
+    fn a_move_takes_the_time_of_its_profile() {
+        // 15°/s, 90°/s² and 125 ms: 1 s, 1/6 s and 1/8 s.
+        let long = 1.0 + 1.0 / 6.0 + 0.125;
+        assert!((move_time_s(Axis::Theta, 0.0, 15.0) - long).abs() < 1e-9);
+        // 0.1 s of ramp: p = 0.225 s, and 90 · 0.225 · 0.1 = 2.025°.
+        assert!((move_time_s(Axis::Phi, 0.0, 2.025) - 0.45).abs() < 1e-9);
         // Down: 15.1° and then 0.1° back up.
         let down = move_time_s(Axis::Theta, 15.0, 0.0);
-        assert!((down - (15.1 / 15.0 + 0.5 + 2.0 * (0.1f64 / 30.0).sqrt())).abs() < 1e-9);
+        let back_up = move_time_s(Axis::Theta, 0.0, 0.1);
+        assert!((down - (long + 0.1 / 15.0 + back_up)).abs() < 1e-9);
         assert_eq!(move_time_s(Axis::Theta, 5.0, 5.0), 0.0);
     }
 

@@ -74,12 +74,19 @@ fn csv_of(rows: &[MotionRow], poses: usize) -> String {
 }
 
 fn csv_of_jerk(rows: &[JerkRow]) -> String {
-    let mut csv = "acceleration_deg_s2,rise_ms,motion_s,settled_s,swing_deg\n".to_owned();
+    let mut csv = "acceleration_deg_s2,rise_ms,default,motion_s,settled_s,slowest_arm_s,own_arm_s,swing_deg\n".to_owned();
     for row in rows {
         let _ = writeln!(
             csv,
-            "{},{},{:.4},{:.4},{:.5}",
-            row.acceleration, row.rise_ms, row.motion_s, row.settled_s, row.swing_deg
+            "{},{},{},{:.4},{:.4},{:.4},{:.4},{:.5}",
+            row.acceleration,
+            row.rise_ms,
+            u8::from(row.is_default),
+            row.motion_s,
+            row.settled_s,
+            row.slowest_s,
+            row.own_s,
+            row.swing_deg
         );
     }
     csv

@@ -2,7 +2,7 @@
 
 use super::table;
 use crate::link::{
-    Controller, LinkError, StreamTransport, Ticket, calibrate_encoder, is_uncalibrated,
+    Controller, LinkError, StreamTransport, Ticket, calibrate_axis, is_uncalibrated,
 };
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
@@ -372,16 +372,40 @@ fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -
             Err(format!("{reading} is no angle"))
         }
     };
-    let fit = calibrate_encoder(arm, axis, stands, absolute, &mut ask)?;
-    table::print(&[
+    let found = calibrate_axis(arm, axis, stands, absolute, &mut ask)?;
+    let deg = |deg: f64| format!("{deg:.5} deg");
+    let mut rows = vec![
         (
-            "RMS before".to_owned(),
-            format!("{:.5} deg", fit.rms_before_deg),
+            "encoder, RMS before".to_owned(),
+            deg(found.encoder.rms_before_deg),
         ),
-        ("RMS after".into(), format!("{:.5} deg", fit.rms_after_deg)),
-        ("map".into(), format!("{:?} µdeg", fit.amplitudes_udeg)),
-        ("next".into(), "`save` keeps it".into()),
-    ]);
+        (
+            "encoder, RMS after".into(),
+            deg(found.encoder.rms_after_deg),
+        ),
+        (
+            "encoder's map".into(),
+            format!("{:?} µdeg", found.encoder.amplitudes_udeg),
+        ),
+    ];
+    match found.gear {
+        Some(gear) => rows.extend([
+            ("gear, RMS before".to_owned(), deg(gear.rms_before_deg)),
+            ("gear, RMS after".into(), deg(gear.rms_after_deg)),
+            (
+                "gear's map".into(),
+                format!("{:?} µdeg", gear.amplitudes_udeg),
+            ),
+        ]),
+        None => rows.push((
+            "gear".into(),
+            "the stands do not tell: let them lie at four or more phases of worm_turn".into(),
+        )),
+    }
+    let limit = deg(f64::from(found.steps_disagree_udeg) * 1e-6);
+    rows.push(("steps_disagree".into(), limit));
+    rows.push(("next".into(), "`save` keeps it".into()));
+    table::print(&rows);
     Ok(())
 }
 

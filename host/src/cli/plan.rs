@@ -1,14 +1,15 @@
 //! `gonia plan`: what a session will do, without doing it.
 
 use super::table;
-use crate::capture::{SETTLE_TIME_S, move_time_s};
+use crate::capture::keep_out::{Pair, apart_deg, way};
+use crate::capture::{SETTLE_TIME_S, move_time_s, nearest_turn_deg};
 use crate::dataset::plan_csv::write_plan_csv;
 use crate::dataset::rig_toml::read_rig;
 use crate::dataset::{Rig, check_writable};
 use crate::plan::{self, RingList, Rings};
 use crate::vision::SamplingGrid;
 use anyhow::{Result, bail};
-use gonia_brdf::Direction;
+use gonia_brdf::{Direction, Pose};
 use gonia_protocol::settings::{Axis, Key};
 use std::path::PathBuf;
 
@@ -16,6 +17,9 @@ use std::path::PathBuf;
 const BYTES_A_PIXEL: u64 = 6;
 /// Bytes of a sample in a file: eight floats.
 const BYTES_A_SAMPLE: u64 = 32;
+
+/// Rows that compare the plan with other orders of the same poses.
+const OF_ALL_POSES: [&str; 2] = ["travelling as listed", "no order is faster than"];
 
 /// Orders the poses, checks them against the arms' limits, and estimates time and disk.
 #[derive(clap::Args)]
@@ -37,6 +41,10 @@ pub struct Plan {
     /// Seconds a pose for exposures and read-out
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     dwell: f64,
+    /// Arms that can touch: leave out poses whose light and view are nearer to each other than this,
+    /// and see how the arms get past each other, in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    keep_out: f64,
 }
 
 impl Plan {
@@ -45,6 +53,9 @@ impl Plan {
         let rig = read_rig(&self.rig)?;
         if !(0.0..=86_400.0).contains(&self.dwell) {
             bail!("--dwell {}: must lie in 0..=86400 seconds", self.dwell);
+        }
+        if !(0.0..180.0).contains(&self.keep_out) {
+            bail!("--keep-out {}: must lie in 0..180 degrees", self.keep_out);
         }
         let mut rings = Rings::paper();
         if let Some(RingList(views)) = self.views {
@@ -57,8 +68,14 @@ impl Plan {
         if let Some(path) = &self.output {
             check_writable(super::fill::folder_of(path))?;
         }
-        let plan = travelling(&rings);
+        let mut plan = travelling(&rings);
+        let apart = (self.keep_out > 0.0).then(|| keep_apart(&mut plan, self.keep_out));
         let mut rows = estimate(&rig, &plan, self.dwell);
+        if let Some(apart) = apart {
+            // Of all the poses, and so no longer to be compared.
+            rows.retain(|(name, _)| !OF_ALL_POSES.contains(&name.as_str()));
+            rows.extend(apart);
+        }
         if let Some(path) = &self.output {
             write_plan_csv(path, &plan.poses)?;
             rows.push(("written".into(), path.display().to_string()));
@@ -71,6 +88,67 @@ impl Plan {
 /// The plan of some rings in the arms' own travelling times.
 pub fn travelling(rings: &Rings) -> plan::Plan {
     plan::plan(rings, &arm_time_s, &arm_time_s)
+}
+
+/// Leaves out the poses at which the arms would touch or to which they cannot come, and goes round
+/// where the straight way is not clear; tells how many.
+fn keep_apart(plan: &mut plan::Plan, keep_out_deg: f64) -> Vec<(String, String)> {
+    let axes = |pose: &Pose| [pose.light, pose.view].map(|d| [d.theta_deg(), d.phi_deg()]);
+    let before = plan.poses.len();
+    plan.poses
+        .retain(|pose| apart_deg(&axes(pose)) >= keep_out_deg);
+    let too_near = before - plan.poses.len();
+    let (mut travel_s, mut rounds, mut out_of_reach) = (0.0, 0u64, 0u64);
+    let limit_deg = |key: Key| f64::from(key.default_of(Axis::Phi)) * 1e-6;
+    let limits_deg = [limit_deg(Key::SoftMin), limit_deg(Key::SoftMax)];
+    let mut at: Option<Pair> = None;
+    plan.poses.retain(|pose| {
+        let Some(from) = at else {
+            at = Some(axes(pose));
+            return true;
+        };
+        let mut to = axes(pose);
+        for (to, from) in to.iter_mut().zip(from) {
+            to[1] = nearest_turn_deg(from[1], to[1], limits_deg).unwrap_or(to[1]);
+        }
+        let Some(legs) = way(&from, &to, keep_out_deg) else {
+            out_of_reach += 1;
+            return false;
+        };
+        rounds += u64::from(legs.len() > 1);
+        travel_s += SETTLE_TIME_S * (legs.len() - 1) as f64;
+        travel_s += [from]
+            .iter()
+            .chain(&legs)
+            .zip(&legs)
+            .map(|(a, b)| leg_time_s(a, b))
+            .sum::<f64>();
+        at = Some(to);
+        true
+    });
+    plan.travel_s = travel_s;
+    let count = |n: u64| table::count(n);
+    vec![
+        (
+            "left out".into(),
+            format!(
+                "{} poses nearer than {keep_out_deg} deg, {} without a clear way",
+                count(too_near as u64),
+                count(out_of_reach)
+            ),
+        ),
+        ("ways round the other arm".into(), count(rounds)),
+    ]
+}
+
+/// The slowest of four axes.
+fn leg_time_s(from: &Pair, to: &Pair) -> f64 {
+    from.iter()
+        .zip(to)
+        .flat_map(|(from, to)| {
+            [(Axis::Theta, 0), (Axis::Phi, 1)].map(|(axis, i)| move_time_s(axis, from[i], to[i]))
+        })
+        .fold(0.0, f64::max)
 }
 
 /// How long an arm takes from one direction to another: its slower axis, φ the shorter way round.
@@ -102,7 +180,7 @@ fn estimate(rig: &Rig, plan: &plan::Plan, dwell_s: f64) -> Vec<(String, String)>
         ("poses".to_owned(), table::count(poses)),
         ("travelling".into(), table::duration(plan.travel_s)),
         (
-            "travelling as listed".into(),
+            OF_ALL_POSES[0].into(),
             format!(
                 "{} ({:.2} x)",
                 table::duration(plan.listed_travel_s),
@@ -110,7 +188,7 @@ fn estimate(rig: &Rig, plan: &plan::Plan, dwell_s: f64) -> Vec<(String, String)>
             ),
         ),
         (
-            "no order is faster than".into(),
+            OF_ALL_POSES[1].into(),
             format!(
                 "{} ({:.2} x)",
                 table::duration(plan.bound_s),

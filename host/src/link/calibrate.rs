@@ -1,9 +1,10 @@
-//! Calibrates the encoder of one axis against a reference, at the bench.
+//! Calibrates one axis, its encoder and its gear, against a reference, at the bench.
 
 use gonia_protocol::message::Outcome;
 use gonia_protocol::settings::{Axis, Key};
 
 use super::error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
+use super::gear_map::{GearMapFit, GearReading, fit_gear_map};
 use super::{Controller, LinkError, Ticket};
 
 /// Readings of the encoder that are averaged at a stand, and the time between two, µs.
@@ -13,6 +14,22 @@ const PAUSE_US: u64 = 20_000;
 const LIMIT_US: u64 = 240_000_000;
 /// While the map is measured, what it is for cannot be asked of the axis, µdeg.
 const WIDE_UDEG: i32 = 1_000_000;
+/// A gear is as regular as its map says when no more than this is left, RMS, degrees.
+const REGULAR_GEAR_DEG: f64 = 0.0015;
+/// How far steps and encoder may disagree on an axis with such a gear and such an encoder, µdeg: what
+/// is left of both, at home and at the pose, is half of it.
+const STEPS_DISAGREE_UDEG: i32 = 10_000;
+
+/// What a calibration has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// The encoder's error over the turn.
+    pub encoder: ErrorMapFit,
+    /// The gear's over a turn of the worm; `None` where the stands do not tell.
+    pub gear: Option<GearMapFit>,
+    /// How far steps and encoder may disagree at rest from now on, µdeg.
+    pub steps_disagree_udeg: i32,
+}
 
 /// Why an axis was not calibrated. Its old settings are in use again after a restart.
 #[derive(Debug, thiserror::Error)]
@@ -41,17 +58,18 @@ pub enum CalibrateError {
 /// Visits `stands_udeg` of an axis without an error map, asks `reference` at each where the axis
 /// truly is (degrees; it is told where the encoder says), fits a map, sets it, and homes again.
 /// With `is_absolute` the reference's zero becomes the axis's; else only the shape is taken from it.
-/// The settings are in use, not yet saved.
+/// The same readings tell the gear's error, without which `steps_disagree` cannot be narrow. The
+/// settings are in use, not yet saved.
 ///
 /// # Errors
 /// A fault under way, a reference that is not read, or readings that make no map.
-pub fn calibrate_encoder(
+pub fn calibrate_axis(
     arm: &mut Controller,
     axis: Axis,
     stands_udeg: &[i32],
     is_absolute: bool,
     reference: &mut dyn FnMut(&mut Controller, f64) -> Result<f64, String>,
-) -> Result<ErrorMapFit, CalibrateError> {
+) -> Result<Calibration, CalibrateError> {
     // Of both axes: the other one may not be calibrated yet, and homing homes both.
     let mut guards = Vec::new();
     for key in [Key::HomeTolerance, Key::StepsDisagree] {
@@ -69,7 +87,7 @@ pub fn calibrate_encoder(
     for other in Axis::BOTH {
         target_udeg[other.index()] = arm.setting(other, Key::SoftMin)?;
     }
-    let mut readings = Vec::new();
+    let (mut readings, mut gear_readings) = (Vec::new(), Vec::new());
     for &stand in stands_udeg {
         target_udeg[axis.index()] = stand;
         let ticket = arm.move_to(target_udeg)?;
@@ -79,6 +97,15 @@ pub fn calibrate_encoder(
         readings.push(Reading {
             encoder_deg,
             reference_deg,
+        });
+        let commanded = arm.status()?.axes[axis.index()].commanded_udeg;
+        gear_readings.push(GearReading {
+            shaft_deg: if is_absolute {
+                reference_deg
+            } else {
+                encoder_deg
+            },
+            ahead_deg: reference_deg - f64::from(commanded) * 1e-6,
         });
     }
 
@@ -92,11 +119,28 @@ pub fn calibrate_encoder(
         let moved = zero + (fit.zero_off_deg / 360.0 * counts).round();
         arm.set_setting(axis, Key::EncoderZero, moved.rem_euclid(counts) as i32)?;
     }
+    let worm_turn_deg = f64::from(arm.setting(axis, Key::WormTurn)?) * 1e-6;
+    let gear = fit_gear_map(&gear_readings, worm_turn_deg);
+    let [cos, sin] = gear.map_or([0; 2], |gear| gear.amplitudes_udeg);
+    arm.set_setting(axis, Key::GearCos, cos)?;
+    arm.set_setting(axis, Key::GearSin, sin)?;
     home(arm)?;
     for (axis, key, value) in guards {
         arm.set_setting(axis, key, value)?;
     }
-    Ok(fit)
+    let before_udeg = arm.setting(axis, Key::StepsDisagree)?;
+    let steps_disagree_udeg = match gear {
+        Some(gear) if gear.rms_after_deg <= REGULAR_GEAR_DEG => {
+            STEPS_DISAGREE_UDEG.min(before_udeg)
+        }
+        _ => before_udeg.max(Key::StepsDisagree.default_of(axis)),
+    };
+    arm.set_setting(axis, Key::StepsDisagree, steps_disagree_udeg)?;
+    Ok(Calibration {
+        encoder: fit,
+        gear,
+        steps_disagree_udeg,
+    })
 }
 
 /// Whether an axis has no error map: then nobody knows how far its encoder is off over the turn.

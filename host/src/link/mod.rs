@@ -7,13 +7,15 @@ mod calibrate;
 mod controller;
 mod error;
 mod error_map;
+mod gear_map;
 mod stream;
 mod transport;
 
-pub use calibrate::{CalibrateError, calibrate_encoder, is_uncalibrated};
+pub use calibrate::{CalibrateError, Calibration, calibrate_axis, is_uncalibrated};
 pub use controller::{Controller, HEARTBEAT_US, Ticket};
 pub use error::LinkError;
 pub use error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
+pub use gear_map::{GearMapFit, GearReading, fit_gear_map};
 pub use stream::StreamTransport;
 pub use transport::Transport;
 

@@ -130,24 +130,19 @@ fn setting_panel(rows: &[MotionRow], poses: usize, limit_deg: f64) -> Markup {
 }
 
 fn jerk_panel(rows: &[JerkRow]) -> Markup {
+    let rise_ms = |row: &JerkRow| f64::from(row.rise_ms);
     let most = |of: &dyn Fn(&JerkRow) -> f64| rows.iter().map(of).fold(0.0, f64::max);
     let plot = Plot {
-        x_most: most(&|row| row.rise_ms) * 1.12,
+        x_most: most(&rise_ms) * 1.12,
         y_most: most(&|row| row.settled_s) * 1.1,
     };
     html! {
-        (plot.frame("jerk: a move until it has settled", "rise of acceleration, ms (0: trapezoid; none is built in)", "seconds"))
+        (plot.frame("jerk", "acceleration_rise (ms); 0: trapezoid", "s"))
         @for rows in rows.chunk_by(|a, b| a.acceleration == b.acceleration) {
-            @let points: Vec<(f64, f64)> = rows.iter().map(|row| (row.rise_ms, row.settled_s)).collect();
+            @let points: Vec<(f64, f64)> = rows.iter().map(|row| (rise_ms(row), row.settled_s)).collect();
             (plot.curve(&points))
-            @for (i, row) in rows.iter().enumerate() {
-                @let last = i + 1 == rows.len();
-                @let label = if last { format!("{} deg/s2", short(row.acceleration)) } else { String::new() };
-                @let is_default = row.rise_ms == 0.0 && row.acceleration == crate::evaluate::motion::jerk::ACCELERATIONS[0];
-                (plot.dot(row.rise_ms, row.settled_s, is_default, if last { "" } else { &label }))
-                @if last {
-                    (svg::text(W - RIGHT, plot.y(row.settled_s) - 7.0, "end", "small", &label))
-                }
+            @for row in rows {
+                (plot.dot(rise_ms(row), row.settled_s, row.is_default, ""))
             }
         }
     }

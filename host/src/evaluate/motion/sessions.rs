@@ -23,7 +23,7 @@ pub struct Factor {
 }
 
 /// What is varied.
-pub const FACTORS: [Factor; 4] = [
+pub const FACTORS: [Factor; 5] = [
     Factor {
         key: Key::SettleWindow,
         unit: "ms",
@@ -46,7 +46,13 @@ pub const FACTORS: [Factor; 4] = [
         key: Key::Acceleration,
         unit: "deg/s2",
         scale: 1e6,
-        values: &[7.5, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0],
+        values: &[15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0],
+    },
+    Factor {
+        key: Key::AccelerationRise,
+        unit: "ms",
+        scale: 1e3,
+        values: &[0.0, 25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0],
     },
 ];
 
