@@ -7,6 +7,7 @@ mod compare;
 mod demo;
 mod device;
 mod fill;
+mod fit;
 mod method;
 mod plan;
 mod process;
@@ -44,6 +45,8 @@ enum Command {
     Rectify(rectify::Rectify),
     /// Samples → bins → dense BRDF
     Fill(fill::Fill),
+    /// An analytic model fitted to a dense BRDF
+    Fit(fit::Fit),
     /// Values of a dense BRDF at directions read from standard input
     Query(query::Query),
     /// How far one dense BRDF is from another, by stratum
@@ -82,6 +85,7 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Process(command) => command.run(),
         Command::Rectify(command) => command.run(),
         Command::Fill(command) => command.run(),
+        Command::Fit(command) => command.run(),
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Chart(command) => command.run(),

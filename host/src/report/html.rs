@@ -189,9 +189,9 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
         .truth
         .map(|truth: &dyn Brdf| slices::of_model(truth, grid));
     let white = slices::white(truth.as_deref().unwrap_or(&measured));
-    let unit = match (input.summary.scale, input.truth) {
-        (Scale::Relative, None) => "(relative)",
-        _ => "1/sr",
+    let unit = match input.summary.scale {
+        Scale::Relative => "(relative)",
+        Scale::Absolute => "1/sr",
     };
     let sheet = |drawing: Markup, name: &str, what: &str| {
         html! { figure { (drawing) figcaption { b { (name) } " · " (what) } } }

@@ -1,4 +1,5 @@
-//! Analytic BRDF models: the simulator's materials, and what measurements are compared with.
+//! Analytic BRDF models: the simulator's materials, and what measurements are compared with and
+//! fitted by ([`crate::fit`]).
 
 pub mod ggx;
 pub mod kurt;
