@@ -22,6 +22,19 @@ pub trait Brdf: Send + Sync {
     /// Value for unit vectors towards the light and the viewer, both with z > 0. The cosine of the
     /// light is not included.
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3];
+
+    /// The radiance towards the viewer under several lights: directions with z > 0, each with its
+    /// irradiance per channel, the cosine included.
+    fn radiance(&self, lights: &[(Vec3, [f64; 3])], view: Vec3) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (light, irradiance) in lights {
+            let f = self.eval(*light, view);
+            for c in 0..3 {
+                sum[c] += f[c] * irradiance[c];
+            }
+        }
+        sum
+    }
 }
 
 /// The unit vector half-way between two.

@@ -166,10 +166,10 @@ impl Demo {
             write_report(
                 &path(REPORT),
                 &ReportInput {
-                    summary: &summary,
-                    dense: &dense.brdf,
                     truth: Some(truth.as_ref()),
                     measured: Some(&measured),
+                    rig: Some(&rig),
+                    ..ReportInput::new(&summary, &dense.brdf)
                 },
             )
         })?;
