@@ -51,6 +51,19 @@ pub fn test() -> Result<()> {
             "qemu-system-arm is missing: apt-get install qemu-system-arm",
         );
     }
+    if install("chromium", "chromium") {
+        table.step("the report in a browser", || {
+            run(cargo(&root)
+                .args(["test", "-p", "gonia", "--test", "browser"])
+                .args(["--", "--ignored"])
+                .env("GONIA_BROWSER", "chromium"))
+        })?;
+    } else {
+        table.not_run(
+            "the report in a browser",
+            "chromium is missing: apt-get install chromium",
+        );
+    }
     fuzz_all(&mut table, &root, FUZZ_BRIEFLY_S)?;
     table.print();
     Ok(())

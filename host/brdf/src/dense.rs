@@ -22,6 +22,21 @@ impl DenseBrdf {
             .then_some(Self { grid, planes })
     }
 
+    /// The table of values at pairs of direction indices.
+    pub fn from_fn(grid: Grid, at: impl Fn(usize, usize) -> [f32; 3]) -> Self {
+        let n = grid.n_directions();
+        let mut planes = [(); 3].map(|()| Vec::with_capacity(grid.n_cells()));
+        for light in 0..n {
+            for view in 0..n {
+                let value = at(light, view);
+                for c in 0..3 {
+                    planes[c].push(value[c]);
+                }
+            }
+        }
+        Self { grid, planes }
+    }
+
     /// The table of an analytic model.
     pub fn tabulate(grid: Grid, model: &dyn Brdf) -> Self {
         let n = grid.n_directions();

@@ -7,6 +7,7 @@ pub mod bins;
 pub mod cellwise;
 pub mod dense;
 pub mod direction;
+pub mod fit;
 pub mod grid;
 pub mod hemisphere;
 pub mod interpolate;

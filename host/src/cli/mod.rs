@@ -7,14 +7,19 @@ mod compare;
 mod demo;
 mod device;
 mod fill;
+mod fit;
+mod import;
 mod method;
+mod photo;
 mod plan;
 mod process;
 mod progress;
 mod provenance;
 mod query;
 mod rectify;
+mod render;
 mod report;
+mod rivals;
 mod sim_device;
 mod table;
 
@@ -44,6 +49,10 @@ enum Command {
     Rectify(rectify::Rectify),
     /// Samples → bins → dense BRDF
     Fill(fill::Fill),
+    /// An analytic model fitted to a dense BRDF
+    Fit(fit::Fit),
+    /// Other people's measurements → dense BRDF
+    Import(import::Import),
     /// Values of a dense BRDF at directions read from standard input
     Query(query::Query),
     /// How far one dense BRDF is from another, by stratum
@@ -52,6 +61,12 @@ enum Command {
     Chart(chart::Chart),
     /// One HTML file with pictures and figures of a measurement
     Report(report::Report),
+    /// A sphere or a draped cylinder of the material
+    Render(render::Render),
+    /// A photograph of the material beside its render
+    Photo(photo::Photo),
+    /// Other ways to the same BRDF, and how far each is from it
+    Rivals(rivals::Rivals),
     /// Talk to the controller of an arm: identify, home, move, settings, calibration
     Device(device::Device),
     /// Simulated controllers on pseudo-terminals
@@ -82,10 +97,15 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Process(command) => command.run(),
         Command::Rectify(command) => command.run(),
         Command::Fill(command) => command.run(),
+        Command::Fit(command) => command.run(),
+        Command::Import(command) => command.run(),
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Chart(command) => command.run(),
         Command::Report(command) => command.run(),
+        Command::Render(command) => command.run(),
+        Command::Photo(command) => command.run(),
+        Command::Rivals(command) => command.run(),
         Command::Device(command) => command.run(),
         Command::SimDevice(command) => command.run(),
     }

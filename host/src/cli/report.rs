@@ -5,8 +5,8 @@ use crate::report::report_folder;
 use anyhow::Result;
 use std::path::PathBuf;
 
-/// Draws DIR/report.html from DIR/dense.exr and, where they are there, summary.toml, measured.npy
-/// and truth.exr.
+/// Draws DIR/report.html from DIR/dense.exr and, where they are there, summary.toml, measured.npy,
+/// truth.exr, error.exr, rig.toml, the fits of `gonia fit` (*.fit.toml) and charts (*.svg).
 #[derive(clap::Args)]
 #[command(after_long_help = "Example:\n  gonia report gonia-demo")]
 pub struct Report {

@@ -13,7 +13,7 @@ pub struct Figures {
     pub a: String,
     /// Name of the second one, which the first is judged by.
     pub b: String,
-    /// Cells of the grid (of the mask, where there is one).
+    /// Cells of the grid (of the mask, where there is one), a pole counted once.
     pub cells_total: u64,
     /// Cells compared. Fewer than all when they were subsampled.
     pub cells_compared: u64,

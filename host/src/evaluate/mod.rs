@@ -11,6 +11,7 @@ pub mod compare;
 pub mod figures;
 pub mod motion;
 pub mod render;
+pub mod rivals;
 pub mod stratum;
 pub mod tabulated;
 

@@ -48,7 +48,7 @@ pub fn pointing(pointing: &Pointing) -> Markup {
 pub fn stages(stages: &[Stage]) -> Markup {
     const W: f64 = 380.0;
     const ROW: f64 = 24.0;
-    const LEFT: f64 = 104.0;
+    const LEFT: f64 = 152.0;
     const RIGHT: f64 = 88.0;
     let longest = stages
         .iter()

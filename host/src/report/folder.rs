@@ -3,9 +3,12 @@
 use super::{ReportInput, write_report};
 use crate::dataset::cell_mask::read_mask;
 use crate::dataset::dense_exr::read_dense;
+use crate::dataset::fit_toml::FitNote;
+use crate::dataset::rig_toml::read_rig;
+use crate::dataset::rivals_toml::Rivals;
 use crate::dataset::{FileError, Summary};
 use crate::evaluate::Tabulated;
-use gonia_brdf::Brdf;
+use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use std::path::{Path, PathBuf};
 
 /// What a run writes into its folder, and the report is drawn from.
@@ -16,11 +19,18 @@ pub const DENSE: &str = "dense.exr";
 pub const TRUTH: &str = "truth.exr";
 /// The cells that hold a measurement, see [`crate::dataset::CellMask`].
 pub const MEASURED: &str = "measured.npy";
+/// The standard errors of `gonia fill --error`.
+pub const ERRORS: &str = "error.exr";
+/// The comparison of `gonia rivals`.
+pub const RIVALS: &str = "rivals.toml";
+/// The rig.
+pub const RIG: &str = "rig.toml";
 /// The report.
 pub const REPORT: &str = "report.html";
 
 /// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there
-/// `summary.toml`, `measured.npy` and `truth.exr`. Returns its path.
+/// `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
+/// (`*.fit.toml`) and charts (`*.svg`). Returns its path.
 ///
 /// # Errors
 /// One line naming the file: no dense BRDF, a file that cannot be used, a truth of another grid, or
@@ -45,33 +55,70 @@ pub fn report_folder(folder: &Path) -> Result<PathBuf, FileError> {
         true => Some(read_mask(&measured_path, file.brdf.grid())?),
         false => None,
     };
-    let truth_path = folder.join(TRUTH);
-    let truth = match truth_path.exists() {
-        true => Some(read_dense(&truth_path)?.brdf),
+    let grid = file.brdf.grid();
+    let truth = table_beside(folder, TRUTH, grid)?;
+    let errors = table_beside(folder, ERRORS, grid)?;
+    let rig_path = folder.join(RIG);
+    let rig = match rig_path.exists() {
+        true => Some(read_rig(&rig_path)?),
         false => None,
     };
-    if truth
-        .as_ref()
-        .is_some_and(|truth| truth.grid() != file.brdf.grid())
-    {
-        return Err(FileError::new(
-            &truth_path,
-            format_args!("is of another grid than {DENSE}"),
-            "remove it, or make it again with the same steps",
-        ));
-    }
+    let rivals_path = folder.join(RIVALS);
+    let rivals = match rivals_path.exists() {
+        true => Some(Rivals::read(&rivals_path)?),
+        false => None,
+    };
+    let fits = FitNote::read_all(folder)?;
+    let charts = charts_of(folder);
     let truth = truth.as_ref().map(Tabulated::new);
     let report = folder.join(REPORT);
     write_report(
         &report,
         &ReportInput {
-            summary: &summary,
-            dense: &file.brdf,
             truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
             measured: measured.as_ref(),
+            errors: errors.as_ref(),
+            rig: rig.as_ref(),
+            fits: &fits,
+            rivals: rivals.as_ref(),
+            charts: &charts,
+            ..ReportInput::new(&summary, &file.brdf)
         },
     )?;
     Ok(report)
+}
+
+/// A table beside the dense BRDF, of the same grid; `None` where it is not there.
+fn table_beside(folder: &Path, name: &str, grid: Grid) -> Result<Option<DenseBrdf>, FileError> {
+    let path = folder.join(name);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let brdf = read_dense(&path)?.brdf;
+    if brdf.grid() != grid {
+        return Err(FileError::new(
+            &path,
+            format_args!("is of another grid than {DENSE}"),
+            "remove it, or make it again with the same steps",
+        ));
+    }
+    Ok(Some(brdf))
+}
+
+/// The charts of a folder, by name.
+fn charts_of(folder: &Path) -> Vec<(String, String)> {
+    let mut charts: Vec<(String, String)> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "svg"))
+        .filter_map(|path| {
+            let name = path.file_stem()?.to_string_lossy().into_owned();
+            Some((name, std::fs::read_to_string(path).ok()?))
+        })
+        .collect();
+    charts.sort();
+    charts
 }
 
 #[cfg(test)]
@@ -80,7 +127,6 @@ mod tests {
     use crate::dataset::cell_mask::write_mask;
     use crate::dataset::dense_exr::write_dense;
     use crate::dataset::{CellMask, DenseFile, Scale};
-    use gonia_brdf::{DenseBrdf, Grid};
 
     fn flat(step_deg: f64, value: f32) -> DenseFile {
         let grid = Grid::with_step_deg(step_deg).unwrap();

@@ -1,7 +1,8 @@
 //! The page: what a reader sees, in its order.
 
 use super::charts::{self, seconds, thousands};
-use super::{ReportInput, panels, shots, slices};
+use super::subspaces::Subspace;
+use super::{ReportInput, explorer, fits, panels, rivals, shots, slices, spans, subspaces};
 use crate::dataset::summary::{FrameCounts, Pointing};
 use crate::dataset::{Scale, Summary};
 use crate::evaluate::Figures;
@@ -32,9 +33,13 @@ pub fn page(input: &ReportInput<'_>) -> Markup {
                     (cards(summary, grid))
                     (provenance(summary))
                     (renders(input))
+                    (explorer::section(input.dense, unit_of(summary)))
                     (slice_sheets(input))
                     @if let Some(figures) = &summary.figures { (figures_table(figures)) }
-                    (session_charts(summary, grid))
+                    (rivals::section(input.rivals))
+                    (fits::section(input.fits))
+                    (session_charts(input, grid))
+                    (charts_beside(input.charts))
                     (refused_and_files(summary))
                     footer.soft {
                         "Made by gonia " (env!("CARGO_PKG_VERSION")) ". This file needs nothing beside itself."
@@ -133,6 +138,14 @@ fn provenance(summary: &Summary) -> Markup {
     }
 }
 
+/// What the values are: 1/sr only where the file says so.
+fn unit_of(summary: &Summary) -> &'static str {
+    match summary.scale {
+        Scale::Relative => "(relative)",
+        Scale::Absolute => "1/sr",
+    }
+}
+
 /// The factor that brings the measured values to the truth's scale, where one was fitted.
 fn factor(input: &ReportInput<'_>) -> f64 {
     match (input.truth, &input.summary.figures) {
@@ -189,10 +202,7 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
         .truth
         .map(|truth: &dyn Brdf| slices::of_model(truth, grid));
     let white = slices::white(truth.as_deref().unwrap_or(&measured));
-    let unit = match (input.summary.scale, input.truth) {
-        (Scale::Relative, None) => "(relative)",
-        _ => "1/sr",
-    };
+    let unit = unit_of(input.summary);
     let sheet = |drawing: Markup, name: &str, what: &str| {
         html! { figure { (drawing) figcaption { b { (name) } " · " (what) } } }
     };
@@ -213,8 +223,39 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
             @if let Some(mask) = input.measured.filter(|mask| mask.grid() == grid) {
                 (sheet(panels::marks(&slices::of_mask(mask)), "Measured bins", "the rest is interpolated"))
             }
+            @if let Some(errors) = input.errors.filter(|errors| errors.grid() == grid) {
+                (sheet(panels::shares(&slices::relative_errors(errors, input.dense)), "Error bars",
+                    "standard error as a share of the value, mean over the channels"))
+            }
+        }
+        h2 { "Slices over the light's elevation" }
+        p.soft { "The paper's Fig. 9 b to d, measured; the scale of colours is that of the slices above." }
+        div.sheets {
+            @for subspace in Subspace::ALL {
+                (sheet(subspaces::sheet(input.dense, subspace, factor, white), subspace.name(), "measured"))
+            }
         }
     }
+}
+
+/// Charts that others made, as they are; the page's style does not reach into an image.
+fn charts_beside(charts: &[(String, String)]) -> Markup {
+    html! {
+        @if !charts.is_empty() {
+            h2 { "Cost and accuracy" }
+            div.sheets {
+                @for (name, svg) in charts {
+                    figure.chart { img src=(svg_uri(svg)) alt=(name); figcaption { (name) } }
+                }
+            }
+        }
+    }
+}
+
+fn svg_uri(svg: &str) -> String {
+    use base64::Engine as _;
+    let text = base64::engine::general_purpose::STANDARD.encode(svg);
+    format!("data:image/svg+xml;base64,{text}")
 }
 
 fn figures_table(figures: &Figures) -> Markup {
@@ -247,7 +288,7 @@ fn figures_table(figures: &Figures) -> Markup {
                             td.num { (format!("{:.2} %", 100.0 * row.cos_error_mean)) }
                             td.num { (format!("{:.1} %", 100.0 * row.cos_error_p99)) }
                             td.num { (optional(row.delta_e, 2)) }
-                            td.num { (format!("{:.1e}", row.reciprocity_a)) }
+                            td.num { @if row.reciprocity_a == 0.0 { "exact" } @else { (format!("{:.1e}", row.reciprocity_a)) } }
                         }
                     }
                 }
@@ -262,9 +303,19 @@ fn figures_table(figures: &Figures) -> Markup {
     }
 }
 
-fn session_charts(summary: &Summary, grid: Grid) -> Markup {
+fn session_charts(input: &ReportInput<'_>, grid: Grid) -> Markup {
+    let summary = input.summary;
     html! {
         div.charts {
+            @if let Some(rig) = input.rig {
+                section {
+                    h2 { "Span of a frame" }
+                    figure {
+                        (spans::chart(rig))
+                        figcaption { "By how much elevations differ from the arm's at the edges of the sampled disc, eq. (2)" }
+                    }
+                }
+            }
             @if let Some(pointing) = &summary.pointing {
                 section {
                     h2 { "Pointing" }
@@ -426,11 +477,13 @@ mod tests {
         let summary = full_summary(&dense, &mask, &truth);
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("report.html");
+        let rig = crate::dataset::Rig::paper(400);
         let input = ReportInput {
-            summary: &summary,
-            dense: &dense,
             truth: Some(&truth),
             measured: Some(&mask),
+            errors: Some(&dense),
+            rig: Some(&rig),
+            ..ReportInput::new(&summary, &dense)
         };
         write_report(&path, &input).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
@@ -445,8 +498,11 @@ mod tests {
                 &address[..address.len().min(80)]
             );
         }
-        assert!(!text.contains("@import") && !text.contains("url(") && !text.contains("<script"));
+        assert!(!text.contains("@import") && !text.contains("url("));
+        assert!(!text.contains("<script src") && !text.contains("fetch("));
         for said in [
+            "Through the data",
+            "Span of a frame",
             "Pointing",
             "Time by stage",
             "Bins filled",
@@ -456,8 +512,8 @@ mod tests {
         ] {
             assert!(text.contains(&format!("<h2>{said}</h2>")), "{said}");
         }
-        // Four sheets of nine panels and their scales, the map of bins and its scale.
-        assert_eq!(text.matches("<image").count(), 4 * 10 + 2);
+        // Five sheets of nine panels and their scales, three of subspaces, the map of bins and its scale.
+        assert_eq!(text.matches("<image").count(), 5 * 10 + 18 + 18 + 36 + 2);
         assert_eq!(text.matches("<img").count(), 6);
         assert!(text.contains("Two-thread fabric &lt;gold &amp; green&gt;"));
     }
@@ -466,12 +522,7 @@ mod tests {
     fn a_report_of_the_dense_brdf_alone_leaves_out_what_is_not_known() {
         let (dense, _) = measured_fabric(15.0);
         let summary = Summary::new("somebody's BRDF", Scale::Relative);
-        let input = ReportInput {
-            summary: &summary,
-            dense: &dense,
-            truth: None,
-            measured: None,
-        };
+        let input = ReportInput::new(&summary, &dense);
         let text = page(&input).into_string();
         assert!(!text.contains("Pointing") && !text.contains("Figures of merit"));
         assert!(!text.contains("Measured against true"));
@@ -485,11 +536,13 @@ mod tests {
         let truth = Kurt::two_thread_fabric();
         let (dense, mask) = measured_fabric(4.0);
         let summary = full_summary(&dense, &mask, &truth);
+        let rig = crate::dataset::Rig::paper(400);
         let input = ReportInput {
-            summary: &summary,
-            dense: &dense,
             truth: Some(&truth),
             measured: Some(&mask),
+            errors: Some(&dense),
+            rig: Some(&rig),
+            ..ReportInput::new(&summary, &dense)
         };
         let start = std::time::Instant::now();
         let drawn = shots::draw(&dense, 1.0, None);

@@ -5,22 +5,29 @@
 
 mod charts;
 mod color_map;
+mod explorer;
+mod fits;
 pub mod folder;
 pub mod frontier;
 mod html;
 mod motion;
 mod panels;
 pub mod png;
+pub mod rivals;
 mod shots;
 mod slices;
+mod spans;
+mod subspaces;
 mod svg;
 pub mod tone;
 
 pub use folder::report_folder;
 pub use motion::motion_chart;
 
+use crate::dataset::fit_toml::FitNote;
+use crate::dataset::rivals_toml::Rivals;
 use crate::dataset::whole_file::write_whole_bytes;
-use crate::dataset::{CellMask, FileError, Summary};
+use crate::dataset::{CellMask, FileError, Rig, Summary};
 use gonia_brdf::{Brdf, DenseBrdf};
 use std::path::Path;
 
@@ -35,6 +42,33 @@ pub struct ReportInput<'a> {
     pub truth: Option<&'a dyn Brdf>,
     /// The cells that hold a measurement, where that is known.
     pub measured: Option<&'a CellMask>,
+    /// The standard error of each cell, where it was computed.
+    pub errors: Option<&'a DenseBrdf>,
+    /// The rig, for the spans of its frames.
+    pub rig: Option<&'a Rig>,
+    /// Models fitted to the measured BRDF.
+    pub fits: &'a [FitNote],
+    /// Other ways to the same BRDF.
+    pub rivals: Option<&'a Rivals>,
+    /// Charts that stand beside the data: name and SVG.
+    pub charts: &'a [(String, String)],
+}
+
+impl<'a> ReportInput<'a> {
+    /// A report of numbers and values, with nothing beside them.
+    pub fn new(summary: &'a Summary, dense: &'a DenseBrdf) -> Self {
+        Self {
+            summary,
+            dense,
+            truth: None,
+            measured: None,
+            errors: None,
+            rig: None,
+            fits: &[],
+            rivals: None,
+            charts: &[],
+        }
+    }
 }
 
 /// Writes the report whole: one HTML file that needs no other file and no network.

@@ -47,6 +47,23 @@ pub fn differences(slices: &[Slice<f32>], limit: f32) -> Markup {
     )
 }
 
+/// Shares from none to the largest of all panels.
+pub fn shares(slices: &[Slice<f32>]) -> Markup {
+    let largest = super::slices::largest_difference(slices);
+    let paint = |share: &f32| color_map::sequential(share / largest);
+    let tick = |t: f64| (t, format!("{:.1} %", 100.0 * t * f64::from(largest)));
+    let ticks = [0.0, 0.5, 1.0].map(tick).to_vec();
+    sheet(
+        slices,
+        paint,
+        &Scale {
+            ramp: &color_map::sequential,
+            ticks,
+            unit: "",
+        },
+    )
+}
+
 /// Measured cells in a sheet of empty ones.
 pub fn marks(slices: &[Slice<bool>]) -> Markup {
     let paint = |marked: &bool| color_map::sequential(if *marked { 0.85 } else { 0.08 });

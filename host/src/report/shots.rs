@@ -2,7 +2,7 @@
 
 use super::{color_map, png, svg, tone};
 use crate::evaluate::Tabulated;
-use crate::evaluate::color::{delta_e, luminance};
+use crate::evaluate::color::delta_e;
 use crate::evaluate::render::{self, Light, Picture};
 use gonia_brdf::{Brdf, DenseBrdf};
 
@@ -51,12 +51,12 @@ pub fn draw(dense: &DenseBrdf, factor: f64, truth: Option<&dyn Brdf>) -> Vec<Sho
             let exposure = exposure(true_shot.as_ref().unwrap_or(&shot));
             Shots {
                 name,
-                measured: uri(&tone::picture_rgba(&smooth_edge(&shot), exposure)),
+                measured: uri(&tone::picture_rgba(&shot.with_smooth_outline(), exposure)),
                 beside_truth: true_shot.map(|truth| {
                     let delta_e = differences(&shot, &truth, exposure);
                     let brightest = brightest_of(&delta_e);
                     BesideTruth {
-                        truth: uri(&tone::picture_rgba(&smooth_edge(&truth), exposure)),
+                        truth: uri(&tone::picture_rgba(&truth.with_smooth_outline(), exposure)),
                         difference: uri(&difference_rgba(&delta_e, &shot.cover, brightest)),
                         brightest_delta_e: brightest,
                     }
@@ -98,34 +98,4 @@ fn difference_rgba(delta_e: &[f32], cover: &[f32], brightest: f64) -> Vec<[u8; 4
         [r, g, b, (255.0 * cover) as u8]
     };
     delta_e.iter().zip(cover).map(pixel).collect()
-}
-
-/// A picture of one point a pixel with its outline smoothed: cheaper than four points everywhere.
-fn smooth_edge(picture: &Picture) -> Picture {
-    let (w, h) = (picture.width, picture.height);
-    let mut smooth = picture.clone();
-    let inside = |x: usize, y: usize| picture.cover[y * w + x] > 0.0;
-    for y in 1..h - 1 {
-        for x in 1..w - 1 {
-            let block = (0..9).map(|k| (x + k % 3 - 1, y + k / 3 - 1));
-            let near: Vec<[f32; 3]> = block
-                .filter(|(x, y)| inside(*x, *y))
-                .map(|(x, y)| picture.rgb[y * w + x])
-                .collect();
-            if near.is_empty() || near.len() == 9 {
-                continue;
-            }
-            let at = y * w + x;
-            smooth.cover[at] = near.len() as f32 / 9.0;
-            if !inside(x, y) {
-                // The colour beyond the outline is that of the darkest point next to it.
-                let darkest = near
-                    .iter()
-                    .copied()
-                    .min_by(|a, b| luminance(*a).total_cmp(&luminance(*b)));
-                smooth.rgb[at] = darkest.unwrap_or_default();
-            }
-        }
-    }
-    smooth
 }

@@ -60,6 +60,14 @@ pub fn of_mask(mask: &CellMask) -> Vec<Slice<bool>> {
     each(grid, |light, view| mask.contains(grid.cell(light, view)))
 }
 
+/// Standard errors as shares of their values, mean over the channels.
+pub fn relative_errors(errors: &DenseBrdf, values: &DenseBrdf) -> Vec<Slice<f32>> {
+    each(values.grid(), |light, view| {
+        let (e, v) = (errors.at(light, view), values.at(light, view));
+        [0, 1, 2].map(|c| e[c] / v[c].max(1e-9)).iter().sum::<f32>() / 3.0
+    })
+}
+
 /// Mean over the channels of ln(a/b), cell by cell.
 pub fn log_ratio(a: &[Slice<[f32; 3]>], b: &[Slice<[f32; 3]>]) -> Vec<Slice<f32>> {
     let ratio = |(a, b): (&[f32; 3], &[f32; 3])| {

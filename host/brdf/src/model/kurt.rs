@@ -4,8 +4,8 @@
 //! Per lobe: `f = F(ωi·h) D(h) / (4 (ωi·h) [(n·ωi)(n·ωv)]^α)` with
 //! `D = exp(−tan²θh (cos²φh/mx² + sin²φh/my²)) / (π mx my cos⁴θh)`, on a base `kd/π`.
 
-use super::Brdf;
-use crate::direction::{Vec3, dot, normalize};
+use super::{Brdf, half_vector};
+use crate::direction::{Vec3, dot};
 use std::f64::consts::PI;
 
 /// A diffuse base and any number of lobes. Reciprocal and positive.
@@ -103,7 +103,7 @@ impl Kurt {
 impl Brdf for Kurt {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
         let mut f = self.diffuse_over_pi;
-        let h = normalize([light[0] + view[0], light[1] + view[1], light[2] + view[2]]);
+        let h = half_vector(light, view);
         let cos_d = dot(light, h).max(1e-9);
         let inv_cos2 = 1.0 / (h[2] * h[2]);
         let schlick = (1.0 - cos_d).powi(5);
@@ -126,34 +126,15 @@ impl Brdf for Kurt {
 
 #[cfg(test)]
 mod tests {
+    use super::super::checks;
     use super::*;
-    use crate::direction::Direction;
 
     #[test]
     fn the_demos_materials_are_reciprocal_positive_and_lose_energy() {
         for model in [Kurt::two_thread_fabric(), Kurt::white_reference_fabric()] {
+            checks::is_positive_and_reciprocal(&model);
             for theta_i in [0.0, 30.0, 60.0, 80.0] {
-                let light = Direction::from_deg(theta_i, 40.0).to_vec3();
-                let mut albedo = [0.0; 3];
-                let (n_theta, n_phi) = (90, 180);
-                for t in 0..n_theta {
-                    for p in 0..n_phi {
-                        let theta = (t as f64 + 0.5) / n_theta as f64 * PI / 2.0;
-                        let view = Direction {
-                            theta,
-                            phi: p as f64 / n_phi as f64 * 2.0 * PI,
-                        }
-                        .to_vec3();
-                        let (f, g) = (model.eval(light, view), model.eval(view, light));
-                        let solid_angle =
-                            theta.sin() * (PI / 2.0 / n_theta as f64) * (2.0 * PI / n_phi as f64);
-                        for c in 0..3 {
-                            assert!(f[c] > 0.0);
-                            assert!((f[c] - g[c]).abs() <= 1e-9 * f[c]);
-                            albedo[c] += f[c] * view[2] * solid_angle;
-                        }
-                    }
-                }
+                let albedo = checks::albedo(&model, theta_i, 40.0);
                 assert!(albedo.iter().all(|a| *a < 1.0), "{theta_i}: {albedo:?}");
             }
         }

@@ -22,18 +22,18 @@ use crate::plan::Rings;
 use crate::process::FrameSource;
 use crate::report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use crate::report::{ReportInput, write_report, write_sphere};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use gonia_brdf::DenseBrdf;
-use gonia_brdf::model::Kurt;
+use gonia_brdf::model::{Kurt, Material};
 use gonia_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Measures a two-thread fabric of known BRDF on the simulated rig.
+/// Measures a material of known BRDF, a two-thread fabric unless told, on the simulated rig.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia demo --quick\n  gonia demo --out fabric --frame-px 600\n\nThe whole plan has 8505 poses of the material and as many of the reference, and takes minutes;\n--quick has 925, a grid of 4 degrees, and keeps its frames, so that `gonia process` can be tried\non them."
+    after_long_help = "Example:\n  gonia demo --quick\n  gonia demo --material silk --out silk --frame-px 600\n\nThe whole plan has 8505 poses of the material and as many of the reference, and takes minutes;\n--quick has 925, a grid of 4 degrees, and keeps its frames, so that `gonia process` can be tried\non them."
 )]
 pub struct Demo {
     /// Fewer poses and a coarser grid, in less than a minute
@@ -42,6 +42,10 @@ pub struct Demo {
     /// Folder for all that is written
     #[arg(long, value_name = "DIR", default_value = "gonia-demo")]
     out: PathBuf,
+    /// What is measured: fabric, white, lambert, brushed-metal, satin-paint, or a cloth of the
+    /// microcylinder model: linen, silk, satin, shot-silk
+    #[arg(long, value_name = "NAME", default_value = "fabric", value_parser = Material::NAMES)]
+    material: String,
     /// Side of a frame in pixels [default: 400, quick: 240]
     #[arg(long, value_name = "PX")]
     frame_px: Option<usize>,
@@ -84,7 +88,8 @@ impl Demo {
         let plan = travelling(&rings);
         write_plan_csv(&path("plan.csv"), &plan.poses)?;
 
-        let truth = Arc::new(Kurt::two_thread_fabric());
+        let material = Material::named(&self.material).context("--material")?;
+        let truth = material.brdf;
         let mut camera = SimulatedCamera::new(Scene::new(
             geometry_of(&rig),
             truth.clone(),
@@ -106,12 +111,13 @@ impl Demo {
             write_samples(&path("samples.npy"), &processed.samples)
         })?;
         let frame_rows = process::describe(&processed);
-        let mut summary = summary::start(&session, &processed, plan.poses.len());
+        let mut summary = summary::start(material.what, &session, &processed, plan.poses.len());
         let filled = fill(processed.samples, grid, settings, false, &mut progress)?;
         summary
             .provenance
             .extend(fill::provenance_of(&filled.settings));
         for (name, text) in [
+            ("material", material.name.to_owned()),
             ("seed", self.seed.to_string()),
             ("rig", format!("simulated, frames of {frame_px} px")),
             ("plan", format!("{} poses", plan.poses.len())),
@@ -160,10 +166,10 @@ impl Demo {
             write_report(
                 &path(REPORT),
                 &ReportInput {
-                    summary: &summary,
-                    dense: &dense.brdf,
                     truth: Some(truth.as_ref()),
                     measured: Some(&measured),
+                    rig: Some(&rig),
+                    ..ReportInput::new(&summary, &dense.brdf)
                 },
             )
         })?;

@@ -27,9 +27,9 @@ const FILES: [(&str, &str); 10] = [
 ];
 
 /// The part of the summary that is known before interpolation.
-pub fn start(session: &Session, processed: &Processed, poses: usize) -> Summary {
+pub fn start(material: &str, session: &Session, processed: &Processed, poses: usize) -> Summary {
     let mut summary = Summary::new(
-        "Two-thread fabric on the simulated rig",
+        format!("{} on the simulated rig", capitalised(material)),
         process::scale_of(processed),
     );
     summary.poses = Some(PoseCounts {
@@ -41,6 +41,14 @@ pub fn start(session: &Session, processed: &Processed, poses: usize) -> Summary 
     summary.frames = Some(frames);
     summary.pointing = session.pointing();
     summary
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters
+        .next()
+        .map(|first| first.to_uppercase().chain(letters).collect())
+        .unwrap_or_default()
 }
 
 /// Adds the counts of bins and cells. Measured cells are those of the bins and their mirrors; cells

@@ -14,9 +14,15 @@ pub struct Light {
 
 /// A single light from above the camera, 40° from the line of sight.
 pub fn single() -> Vec<Light> {
-    let (s, c) = 40f64.to_radians().sin_cos();
+    from_above(40.0, 0.0)
+}
+
+/// A single light, so many degrees above the line of sight and to the right of it.
+pub fn from_above(up_deg: f64, right_deg: f64) -> Vec<Light> {
+    let (up_sin, up_cos) = up_deg.to_radians().sin_cos();
+    let (right_sin, right_cos) = right_deg.to_radians().sin_cos();
     vec![Light {
-        towards: [0.0, s, c],
+        towards: [up_cos * right_sin, up_sin, up_cos * right_cos],
         irradiance: [PI; 3],
     }]
 }

@@ -3,13 +3,17 @@
 //! Camera space: x right, y up, z towards the viewer, who is far away (parallel projection). There
 //! are no cast shadows and no inter-reflections; what is seen is f · E · cos θi.
 
+mod bent;
 mod cylinder;
+mod environment;
 mod light;
 mod picture;
 mod sphere;
 
+pub use bent::bent;
 pub use cylinder::cylinder;
-pub use light::{Light, single, studio};
+pub use environment::Environment;
+pub use light::{Light, from_above, single, studio};
 pub use picture::Picture;
 pub use sphere::sphere;
 
@@ -42,19 +46,15 @@ impl Frame {
     /// The radiance towards the viewer.
     fn shade(&self, brdf: &dyn Brdf, lights: &[Light]) -> [f64; 3] {
         let view = self.to_local(VIEW);
-        let mut sum = [0.0; 3];
         if view[2] < LEAST_COSINE {
-            return sum;
+            return [0.0; 3];
         }
-        for light in lights {
-            let towards = self.to_local(light.towards);
-            if towards[2] > LEAST_COSINE {
-                let f = brdf.eval(towards, view);
-                for c in 0..3 {
-                    sum[c] += f[c] * light.irradiance[c] * towards[2];
-                }
-            }
-        }
-        sum
+        let local: Vec<(Vec3, [f64; 3])> = lights
+            .iter()
+            .map(|light| (self.to_local(light.towards), light.irradiance))
+            .filter(|(towards, _)| towards[2] > LEAST_COSINE)
+            .map(|(towards, irradiance)| (towards, irradiance.map(|e| e * towards[2])))
+            .collect();
+        brdf.radiance(&local, view)
     }
 }

@@ -1,0 +1,256 @@
+//! Fits of analytic models to a dense BRDF.
+//!
+//! The residual of a cell and channel is `ln((f + ε)/(d + ε))` with ε a thousandth of the mean
+//! (published comparisons find logarithms the loss that agrees best with what people see; ε keeps
+//! the darkest cells from deciding), or the cosine-weighted difference. All channels are fitted at
+//! once, from many random starts on few cells; the best of them go on with all.
+
+mod cells;
+mod family;
+mod least_squares;
+mod random;
+mod range;
+mod uncertainty;
+
+pub use cells::{Cell, draw};
+pub use family::{Family, Parameter, UnknownFamily};
+pub use range::Range;
+
+use crate::dense::DenseBrdf;
+use crate::model::Brdf;
+use least_squares::{Minimum, minimise};
+use random::Random;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// Squared differences of logarithms.
+    Logarithm,
+    /// Squared differences of f cos θi cos θv.
+    Cosine,
+}
+
+/// How to fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// What is minimised.
+    pub loss: Loss,
+    /// Cells of the last search.
+    pub cells: usize,
+    /// Random starts.
+    pub starts: usize,
+    /// Most steps of a search.
+    pub iterations: usize,
+    /// Seed of cells and starts.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            loss: Loss::Logarithm,
+            cells: 12_000,
+            starts: 32,
+            iterations: 120,
+            seed: 1,
+        }
+    }
+}
+
+/// A fitted model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// The kind of model.
+    pub family: Family,
+    /// Its numbers, in their canonical form.
+    pub values: Vec<f64>,
+    /// The standard uncertainty of each, as if the residuals were independent; `None` where the data
+    /// do not determine it.
+    pub uncertainties: Vec<Option<f64>>,
+    /// Root mean square of the residuals over the cells of the fit.
+    pub residual_rms: f64,
+    /// Whether the search came to its end.
+    pub converged: bool,
+    /// Steps of the last search.
+    pub iterations: usize,
+    /// Cells it used.
+    pub cells: usize,
+    /// How many of the starts that went on ended within one per cent of the best residual.
+    pub agreeing_starts: usize,
+}
+
+/// Why there is nothing to fit.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum FitError {
+    /// No positive value.
+    #[error("the BRDF holds no positive value to fit; check that it is a BRDF")]
+    NotPositive,
+}
+
+/// Cells and steps of the first look from each start.
+const FIRST_CELLS: usize = 800;
+const FIRST_ITERATIONS: usize = 15;
+/// Starts that go on from there, and their cells and steps.
+const SECOND_STARTS: usize = 4;
+const SECOND_CELLS: usize = 2500;
+const SECOND_ITERATIONS: usize = 60;
+
+/// Fits a family to a table. `progress` is told the share done, 0 ..= 1, from any thread.
+///
+/// # Errors
+/// A table without a positive value.
+pub fn fit(
+    dense: &DenseBrdf,
+    family: Family,
+    settings: &Settings,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Fit, FitError> {
+    let cells = draw(dense, settings.cells.max(64), settings.seed);
+    let problem = Problem::new(&cells, family, settings.loss)?;
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let starts: Vec<u64> = (0..settings.starts.max(1) as u64).collect();
+    let mut first: Vec<Minimum> = starts
+        .par_iter()
+        .with_max_len(1)
+        .map(|k| {
+            let mut random =
+                Random::new(settings.seed ^ (k + 1).wrapping_mul(0x2545_f491_4f6c_dd1d));
+            let start = problem.to_free(&family.start(&mut random));
+            let found = problem.search(
+                start,
+                FIRST_CELLS,
+                settings.iterations.min(FIRST_ITERATIONS),
+            );
+            let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+            progress(0.5 * count as f64 / starts.len() as f64);
+            found
+        })
+        .collect();
+    first.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    first.truncate(SECOND_STARTS);
+    let mut second: Vec<Minimum> = first
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|found| {
+            problem.search(
+                found.at,
+                SECOND_CELLS,
+                settings.iterations.min(SECOND_ITERATIONS),
+            )
+        })
+        .collect();
+    second.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    progress(0.8);
+    let best_cost = second.first().map_or(f64::INFINITY, |m| m.cost);
+    let agreeing_starts = second
+        .iter()
+        .filter(|m| m.cost.sqrt() <= 1.01 * best_cost.sqrt())
+        .count();
+    let start = second.swap_remove(0).at;
+    let best = problem.search(start, cells.len(), settings.iterations);
+    progress(1.0);
+    let values = family.canonical(problem.values(&best.at));
+    let uncertainties = uncertainty::standard(&problem, &values, best.cost);
+    let residuals = 3 * cells.len();
+    Ok(Fit {
+        family,
+        values,
+        uncertainties,
+        residual_rms: (best.cost / residuals as f64).sqrt(),
+        converged: best.converged,
+        iterations: best.iterations,
+        cells: cells.len(),
+        agreeing_starts,
+    })
+}
+
+impl Fit {
+    /// The model. `None` only for a list of numbers of the wrong length.
+    pub fn model(&self) -> Option<Box<dyn Brdf>> {
+        self.family.model(&self.values)
+    }
+}
+
+/// Cells, and the model they are to be described by.
+struct Problem<'a> {
+    cells: Vec<&'a Cell>,
+    family: Family,
+    parameters: Vec<Parameter>,
+    loss: Loss,
+    /// The mean of the values.
+    mean: f64,
+    /// What amplitudes are multiplied by: an albedo of one where values are 1/sr.
+    unit: f64,
+}
+
+impl<'a> Problem<'a> {
+    fn new(cells: &'a [Cell], family: Family, loss: Loss) -> Result<Self, FitError> {
+        let sum: f64 = cells.iter().flat_map(|cell| cell.value).sum();
+        let mean = sum / (3 * cells.len().max(1)) as f64;
+        if mean.is_nan() || mean <= 0.0 {
+            return Err(FitError::NotPositive);
+        }
+        // Dark and bright cells alternate, so that any first part is a fair sample.
+        let half = cells.len().div_ceil(2);
+        let (dark, bright) = cells.split_at(half);
+        let mut mixed = Vec::with_capacity(cells.len());
+        for k in 0..half {
+            mixed.push(&dark[k]);
+            mixed.extend(bright.get(k));
+        }
+        Ok(Self {
+            cells: mixed,
+            family,
+            parameters: family.parameters(),
+            loss,
+            mean,
+            unit: mean * PI,
+        })
+    }
+
+    fn search(&self, start: Vec<f64>, cells: usize, iterations: usize) -> Minimum {
+        let cells = &self.cells[..cells.min(self.cells.len())];
+        let residuals =
+            |free: &[f64], out: &mut Vec<f64>| self.residuals(&self.values(free), cells, out);
+        minimise(&residuals, start, iterations)
+    }
+
+    fn residuals(&self, values: &[f64], cells: &[&Cell], out: &mut Vec<f64>) {
+        out.clear();
+        let Some(model) = self.family.model(values) else {
+            return;
+        };
+        let floor = 1e-3 * self.mean;
+        for cell in cells {
+            let f = model.eval(cell.light, cell.view);
+            let cosines = cell.light[2] * cell.view[2] / self.mean;
+            out.extend((0..3).map(|c| match self.loss {
+                Loss::Logarithm => ((f[c] + floor) / (cell.value[c].max(0.0) + floor)).ln(),
+                Loss::Cosine => (f[c] - cell.value[c]) * cosines,
+            }));
+        }
+    }
+
+    /// What a parameter's number is in the range's terms.
+    fn unit_of(&self, parameter: &Parameter) -> f64 {
+        if parameter.is_amplitude {
+            self.unit
+        } else {
+            1.0
+        }
+    }
+
+    fn values(&self, free: &[f64]) -> Vec<f64> {
+        let each = self.parameters.iter().zip(free);
+        each.map(|(p, free)| self.unit_of(p) * p.range.of_free(*free))
+            .collect()
+    }
+
+    /// Free numbers of a start, whose amplitudes are in units of the mean.
+    fn to_free(&self, start: &[f64]) -> Vec<f64> {
+        let each = self.parameters.iter().zip(start);
+        each.map(|(p, value)| p.range.to_free(*value)).collect()
+    }
+}

@@ -1,0 +1,241 @@
+//! Models fitted to noisy tables of themselves: their parameters come back.
+//!
+//! `cargo test --release -p gonia-brdf --test fit -- --ignored --nocapture` prints the table of
+//! docs/results.md, on the paper's grid.
+#![allow(clippy::unwrap_used)]
+
+use gonia_brdf::fit::{Family, Fit, Range, Settings, fit};
+use gonia_brdf::model::Material;
+use gonia_brdf::{Brdf, DenseBrdf, Grid};
+use std::time::Instant;
+
+const NOISE: f64 = 0.015;
+
+/// A table with noise that each value has by itself.
+fn noisy(model: &dyn Brdf, grid: Grid) -> DenseBrdf {
+    let mut planes = DenseBrdf::tabulate(grid, model).into_planes();
+    for (c, plane) in planes.iter_mut().enumerate() {
+        for (cell, value) in plane.iter_mut().enumerate() {
+            let mut x = (3 * cell + c) as u64;
+            x = (x ^ 0x5851_f42d_4c95_7f2d).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            x = (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            x ^= x >> 32;
+            let sum: f64 = (0..4).map(|k| f64::from((x >> (16 * k)) as u16)).sum();
+            let normal = (sum / 65536.0 - 2.0) * 3f64.sqrt();
+            *value *= (1.0 + NOISE * normal) as f32;
+        }
+    }
+    DenseBrdf::new(grid, planes).unwrap()
+}
+
+struct Case {
+    name: &'static str,
+    family: Family,
+    truth: Vec<f64>,
+}
+
+fn case(name: &'static str, family: &str, truth: &[f64]) -> Case {
+    let family: Family = family.parse().unwrap();
+    Case {
+        name,
+        family,
+        truth: family.canonical(truth.to_vec()),
+    }
+}
+
+/// The numbers of a published cloth whose tilts are a pair ±t.
+fn cloth(name: &'static str) -> Case {
+    let threads = Material::threads(name).unwrap();
+    let cover: f64 = threads.iter().map(|t| t.cover).sum();
+    let mut truth: Vec<f64> = threads
+        .iter()
+        .flat_map(|t| {
+            let tilt = t.tilts_deg[0].abs();
+            let [r, g, b] = t.albedo;
+            let widths = [t.surface_width_deg, t.volume_width_deg];
+            [
+                r,
+                g,
+                b,
+                t.index,
+                t.isotropic,
+                widths[0],
+                widths[1],
+                t.azimuth_deg,
+                tilt,
+            ]
+        })
+        .collect();
+    truth.extend([cover, threads[0].cover / cover]);
+    case(name, "sadeghi", &truth)
+}
+
+fn cases() -> Vec<Case> {
+    let lobe_a = [1.9, 1.4, 0.5, 0.06, 0.14, 0.55, 0.35, 23.0];
+    let lobe_b = [0.5, 0.8, 0.55, 0.06, 0.20, 0.62, 0.35, 113.0];
+    vec![
+        case("grey", "lambert", &[0.5, 0.4, 0.2]),
+        case(
+            "brushed",
+            "ggx",
+            &[0.05, 0.04, 0.03, 0.9, 0.8, 0.7, 0.4, 0.12, 0.4, 23.0],
+        ),
+        case(
+            "paint",
+            "ward",
+            &[0.10, 0.16, 0.30, 0.08, 0.07, 0.06, 0.10, 0.25, 23.0],
+        ),
+        case(
+            "fabric",
+            "kurt2",
+            &[&[0.16, 0.12, 0.07], &lobe_a[..], &lobe_b[..]].concat(),
+        ),
+        cloth("linen"),
+        cloth("silk"),
+        cloth("shot-silk"),
+    ]
+}
+
+/// How far each number is from the true one: relative, for azimuths and tilts as a share of 90°.
+/// Threads that are alike but for their azimuth may have changed places.
+fn deviations(case: &Case, found: &[f64]) -> Vec<f64> {
+    let parameters = case.family.parameters();
+    let against = |truth: &[f64]| -> Vec<f64> {
+        parameters
+            .iter()
+            .zip(truth.iter().zip(found))
+            .map(|(p, (truth, found))| {
+                if p.range == Range::Azimuth {
+                    ((found - truth + 90.0).rem_euclid(180.0) - 90.0).abs() / 90.0
+                } else if p.name.starts_with("tilt") {
+                    (found - truth).abs() / 90.0
+                } else {
+                    (found - truth).abs() / truth.abs().max(0.02)
+                }
+            })
+            .collect()
+    };
+    let largest = |d: &[f64]| d.iter().copied().fold(0.0, f64::max);
+    let as_is = against(&case.truth);
+    let Family::Sadeghi { .. } = case.family else {
+        return as_is;
+    };
+    let mut other = case.truth.clone();
+    for k in 0..9 {
+        other.swap(k, 9 + k);
+    }
+    other[19] = 1.0 - other[19];
+    let other = against(&other);
+    if largest(&other) < largest(&as_is) {
+        other
+    } else {
+        as_is
+    }
+}
+
+fn run(case: &Case, grid: Grid, settings: &Settings) -> (Fit, Vec<f64>, f64) {
+    let model = case.family.model(&case.truth).unwrap();
+    let dense = noisy(model.as_ref(), grid);
+    let start = Instant::now();
+    let found = fit(&dense, case.family, settings, &|_| ()).unwrap();
+    let seconds = start.elapsed().as_secs_f64();
+    let deviations = deviations(case, &found.values);
+    (found, deviations, seconds)
+}
+
+/// Fewer cells and starts than by default, on a coarse grid: seconds.
+#[test]
+fn parameters_come_back_within_two_per_cent_from_noisy_tables() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let settings = Settings {
+        cells: 4000,
+        starts: 8,
+        ..Settings::default()
+    };
+    for case in cases() {
+        // Silk has a thread without a tilt, so that the tilt is not determined; linen has none.
+        if case.name == "silk" || case.name == "shot-silk" {
+            continue;
+        }
+        let (found, deviations, _) = run(&case, grid, &settings);
+        assert!(found.converged, "{}", case.name);
+        let noise = found.residual_rms;
+        assert!(
+            (0.9..1.1).contains(&(noise / NOISE)),
+            "{}: {noise}",
+            case.name
+        );
+        for (deviation, p) in deviations.iter().zip(case.family.parameters()) {
+            assert!(
+                *deviation < 0.02,
+                "{}: {} is off by {deviation}: {found:?}",
+                case.name,
+                p.name
+            );
+        }
+        assert!(found.uncertainties.iter().all(Option::is_some));
+    }
+}
+
+#[test]
+fn uncertainties_are_of_the_size_of_the_deviations() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let case = &cases()[2];
+    let mut ratios = Vec::new();
+    for seed in 0..6 {
+        let settings = Settings {
+            cells: 1000,
+            starts: 4,
+            seed,
+            ..Settings::default()
+        };
+        let (found, _, _) = run(case, grid, &settings);
+        for k in 0..found.values.len() {
+            let deviation = found.values[k] - case.truth[k];
+            ratios.push((deviation / found.uncertainties[k].unwrap()).powi(2));
+        }
+    }
+    let rms = (ratios.iter().sum::<f64>() / ratios.len() as f64).sqrt();
+    assert!((0.6..1.5).contains(&rms), "{rms}");
+}
+
+#[test]
+fn a_search_cut_short_says_so_and_keeps_what_it_has() {
+    let case = &cases()[3];
+    let settings = Settings {
+        cells: 500,
+        starts: 1,
+        iterations: 1,
+        ..Settings::default()
+    };
+    let (found, _, _) = run(case, Grid::with_step_deg(10.0).unwrap(), &settings);
+    assert!(!found.converged && found.residual_rms.is_finite());
+    assert!(found.model().is_some());
+}
+
+#[test]
+#[ignore = "a measurement: the paper's grid"]
+fn parameters_come_back_on_the_papers_grid() {
+    for case in cases() {
+        let (found, deviations, seconds) = run(&case, Grid::PAPER, &Settings::default());
+        println!(
+            "{} ({}): residual {:.4}, {} steps, converged {}, {} of 4 starts agree, {seconds:.1} s",
+            case.name,
+            case.family,
+            found.residual_rms,
+            found.iterations,
+            found.converged,
+            found.agreeing_starts
+        );
+        for (k, p) in case.family.parameters().iter().enumerate() {
+            println!(
+                "    {:<16} {:>9.4} true, {:>9.4} ± {} found, off by {:.2} %",
+                p.name,
+                case.truth[k],
+                found.values[k],
+                found.uncertainties[k].map_or("?".into(), |u| format!("{u:.2e}")),
+                100.0 * deviations[k]
+            );
+        }
+    }
+}
