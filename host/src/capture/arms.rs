@@ -211,8 +211,8 @@ impl Arms {
         Some(targets)
     }
 
-    /// Moves both arms, waits until both are at rest, triggers, and collects the latches.
-    pub(super) fn shoot(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Try, LinkError> {
+    /// Moves both arms and waits until both are at rest; what went wrong, if anything did.
+    pub(super) fn go(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
         let mut tickets = [None; 2];
         for ((controller, target), ticket) in
             self.both().into_iter().zip(targets_udeg).zip(&mut tickets)
@@ -222,13 +222,14 @@ impl Arms {
         self.at_udeg = targets_udeg;
         for outcome in self.wait_for(tickets, MOVE_LIMIT_US)?.into_iter().flatten() {
             if outcome != Outcome::Done {
-                return Ok(ended_badly("a move", outcome));
+                return Ok(Some(ended_badly("a move", outcome)));
             }
         }
-        self.trigger()
+        Ok(None)
     }
 
-    fn trigger(&mut self) -> Result<Try, LinkError> {
+    /// Triggers, and collects the latches.
+    pub(super) fn trigger(&mut self) -> Result<Try, LinkError> {
         let exposures_us: heapless::Vec<u32, MAX_PULSES> =
             self.options.exposures_us.iter().copied().collect();
         let pulses = exposures_us.len() as u8;
