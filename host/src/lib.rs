@@ -12,4 +12,5 @@ pub mod link;
 pub mod plan;
 pub mod process;
 pub mod report;
+pub mod session;
 pub mod vision;

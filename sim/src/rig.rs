@@ -89,6 +89,11 @@ impl SimRig {
         lock(&self.world).triggers().last().map(TriggerRecord::pose)
     }
 
+    /// How many trigger pulses there were so far.
+    pub fn trigger_count(&self) -> usize {
+        lock(&self.world).triggers().len()
+    }
+
     /// Every trigger pulse so far.
     pub fn triggers(&self) -> Vec<TriggerRecord> {
         lock(&self.world).triggers().to_vec()

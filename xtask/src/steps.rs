@@ -37,6 +37,11 @@ pub fn test() -> Result<()> {
     table.step("boards", || build_boards(&root))?;
     table.step("size of the boards", || check_sizes(&root))?;
     table.step("tests", || run(cargo(&root).args(["test", "--workspace"])))?;
+    table.step("sessions that are killed", || {
+        run(cargo(&root)
+            .args(["test", "-p", "gonia", "--test", "capture"])
+            .args(["--", "--ignored", "--nocapture", "--test-threads", "1"]))
+    })?;
     if qemu {
         table.step("firmware in QEMU", || {
             // With the whole workspace's features, as they have been built for the tests above.

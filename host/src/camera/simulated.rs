@@ -58,25 +58,28 @@ impl FrameSource for SimulatedCamera {
     }
 
     fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
-        let surface = match row.role {
-            Role::Material => Surface::Material,
-            Role::Reference => Surface::Reference,
-        };
         let exposed_at = self.exposed_at.get(row.frame as usize).ok_or_else(|| {
             FileError::new(Path::new(&row.file), "was never exposed", "expose it")
         })?;
-        let rendered = self
-            .scene
-            .render(surface, *exposed_at, u64::from(row.frame));
-        let frame = Frame {
-            width: rendered.width,
-            height: rendered.height,
-            rgb: rendered.rgb,
-        };
+        let frame = render(&self.scene, row.role, *exposed_at, u64::from(row.frame));
         if let Some(folder) = &self.keep {
             write_frame(&folder.join(&row.file), &frame)?;
         }
         Ok(frame)
+    }
+}
+
+/// What the camera sees of a scene at a pose, with the noise of shot number `shot`.
+pub fn render(scene: &Scene, role: Role, exposed_at: Pose, shot: u64) -> Frame {
+    let surface = match role {
+        Role::Material => Surface::Material,
+        Role::Reference => Surface::Reference,
+    };
+    let rendered = scene.render(surface, exposed_at, shot);
+    Frame {
+        width: rendered.width,
+        height: rendered.height,
+        rgb: rendered.rgb,
     }
 }
 

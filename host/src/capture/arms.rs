@@ -245,14 +245,6 @@ impl Arms {
         Some(legs.into_iter().map(udeg).collect())
     }
 
-    /// Moves both arms, waits until both are at rest, triggers, and collects the latches.
-    pub(super) fn shoot(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Try, LinkError> {
-        match self.go(targets_udeg)? {
-            Some(tried) => Ok(tried),
-            None => self.trigger(),
-        }
-    }
-
     /// Moves both arms, clear of each other, and waits until both are at rest; what went wrong, if
     /// anything did.
     pub(super) fn go(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
@@ -286,7 +278,8 @@ impl Arms {
         Ok(None)
     }
 
-    fn trigger(&mut self) -> Result<Try, LinkError> {
+    /// Triggers, and collects the latches.
+    pub(super) fn trigger(&mut self) -> Result<Try, LinkError> {
         let exposures_us: heapless::Vec<u32, MAX_PULSES> =
             self.options.exposures_us.iter().copied().collect();
         let pulses = exposures_us.len() as u8;

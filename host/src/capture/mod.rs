@@ -1,10 +1,22 @@
 //! A session: both arms to every pose, a trigger, and the encoders latched with it.
 
+mod accounts;
 mod arms;
+mod control;
+mod desk;
 pub mod keep_out;
+mod orders;
+mod port;
 mod session;
 mod timing;
+mod unattended;
+mod watch;
 
 pub use arms::{Arms, BadExposures, HomeError, Options};
-pub use session::{SessionError, SessionSummary, Shot, ShotOutcome, run_session};
+pub use control::{Comparison, Judgement};
+pub use orders::Orders;
+pub use port::{Opener, SessionPort};
+pub use session::{SessionError, SessionSummary, Shooter, Shot, ShotOutcome, run_session};
 pub use timing::{POINTING_LIMIT_DEG, SETTLE_TIME_S, move_time_s, nearest_turn_deg};
+pub use unattended::{Capture, Ended};
+pub use watch::{Told, Watch};

@@ -3,6 +3,7 @@
 use gonia_brdf::Pose;
 use gonia_brdf::direction::{Direction, angle_between};
 use gonia_protocol::message::{Refusal, State};
+use std::time::{Duration, Instant};
 
 use super::arms::{Arms, HomeError, Try};
 use super::timing::POINTING_LIMIT_DEG;
@@ -96,104 +97,205 @@ pub fn run_session(
     poses: &[Pose],
     on_shot: &mut dyn FnMut(ShotOutcome) -> Result<(), SessionError>,
 ) -> Result<SessionSummary, SessionError> {
-    let began_us = arms.now_us();
-    let mut summary = SessionSummary::default();
-    let result = take_all(arms, poses, on_shot, &mut summary);
+    let mut shooter = Shooter::new(arms);
+    let result = shooter.home().and_then(|()| {
+        for (index, pose) in poses.iter().enumerate() {
+            on_shot(shooter.take(index, pose, &mut || Ok(()))?)?;
+        }
+        Ok(())
+    });
+    let summary = shooter.finish();
     if result.is_err() {
         // The error that is reported is the first one; this is only for safety's sake.
         let _ = arms.stop();
     }
-    summary.duration_us = arms.now_us() - began_us;
-    (summary.events_lost, summary.requests_repeated) = arms.losses();
     result.map(|()| summary)
 }
 
-fn take_all(
-    arms: &mut Arms,
-    poses: &[Pose],
-    on_shot: &mut dyn FnMut(ShotOutcome) -> Result<(), SessionError>,
-    summary: &mut SessionSummary,
-) -> Result<(), SessionError> {
-    let homed = match arms.home() {
-        Err(error) if error.may_pass() => {
-            summary.recoveries += 1;
-            arms.recover()
-        }
-        result => result,
-    };
-    homed.map_err(|source| SessionError::Arms { index: 0, source })?;
-    for (index, pose) in poses.iter().enumerate() {
-        let outcome = take(arms, index, pose, summary)?;
-        match &outcome {
-            ShotOutcome::Kept(shot) => {
-                summary.kept += 1;
-                summary.max_pointing_error_deg =
-                    summary.max_pointing_error_deg.max(shot.pointing_error_deg);
-            }
-            ShotOutcome::Refused { .. } => summary.refused += 1,
-        }
-        on_shot(outcome)?;
-    }
-    Ok(())
+/// Takes shots one by one, and counts what happens.
+pub struct Shooter<'a> {
+    arms: &'a mut Arms,
+    began_us: u64,
+    summary: SessionSummary,
+    busy: Duration,
 }
 
-/// One pose, with its retakes.
-fn take(
-    arms: &mut Arms,
-    index: usize,
-    pose: &Pose,
-    summary: &mut SessionSummary,
-) -> Result<ShotOutcome, SessionError> {
-    let apart_deg = angle_between(pose.light.to_vec3(), pose.view.to_vec3()).to_degrees();
-    if apart_deg < arms.keep_out_deg {
-        return Err(SessionError::OutOfReach {
+impl<'a> Shooter<'a> {
+    /// With arms that are connected.
+    pub fn new(arms: &'a mut Arms) -> Self {
+        Self {
+            began_us: arms.now_us(),
+            arms,
+            summary: SessionSummary::default(),
+            busy: Duration::ZERO,
+        }
+    }
+
+    /// The arms.
+    pub fn arms(&mut self) -> &mut Arms {
+        self.arms
+    }
+
+    /// Time by the host's clock in which the arms homed, moved, settled or were triggered. All other time
+    /// they waited for the host.
+    pub fn busy(&self) -> Duration {
+        self.busy
+    }
+
+    /// The figures.
+    pub fn finish(mut self) -> SessionSummary {
+        self.summary.duration_us = self.arms.now_us() - self.began_us;
+        (self.summary.events_lost, self.summary.requests_repeated) = self.arms.losses();
+        self.summary
+    }
+
+    /// Homes the arms that need it, and gets over a fault on the way.
+    ///
+    /// # Errors
+    /// Arms that cannot be brought back.
+    pub fn home(&mut self) -> Result<(), SessionError> {
+        let began = Instant::now();
+        let homed = match self.arms.home() {
+            Err(error) if error.may_pass() => self.recover(),
+            result => result,
+        };
+        self.busy += began.elapsed();
+        homed.map_err(|source| SessionError::Arms { index: 0, source })
+    }
+
+    /// Brings the arms back after a fault, a restart or a lost cable.
+    ///
+    /// # Errors
+    /// Arms that cannot be brought back now.
+    pub fn recover(&mut self) -> Result<(), HomeError> {
+        self.summary.recoveries += 1;
+        self.arms.recover()
+    }
+
+    /// Moves both arms to a pose, to leave them there.
+    ///
+    /// # Errors
+    /// The link failed, or a controller refuses.
+    pub fn park(&mut self, pose: &Pose) -> Result<(), LinkError> {
+        let began = Instant::now();
+        let parked = match self.arms.targets_udeg(pose) {
+            Some(targets) => self.arms.go(targets).map(drop),
+            None => Ok(()),
+        };
+        self.busy += began.elapsed();
+        parked
+    }
+
+    /// One pose, with its retakes. `at_rest` is called before each trigger, when both arms have
+    /// settled.
+    ///
+    /// # Errors
+    /// A pose out of reach, arms that cannot be brought back, or an error of `at_rest`.
+    pub fn take(
+        &mut self,
+        index: usize,
+        pose: &Pose,
+        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
+    ) -> Result<ShotOutcome, SessionError> {
+        let outcome = self.take_one(index, pose, at_rest)?;
+        match &outcome {
+            ShotOutcome::Kept(shot) => {
+                self.summary.kept += 1;
+                self.summary.max_pointing_error_deg = self
+                    .summary
+                    .max_pointing_error_deg
+                    .max(shot.pointing_error_deg);
+            }
+            ShotOutcome::Refused { .. } => self.summary.refused += 1,
+        }
+        Ok(outcome)
+    }
+
+    fn take_one(
+        &mut self,
+        index: usize,
+        pose: &Pose,
+        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
+    ) -> Result<ShotOutcome, SessionError> {
+        self.check_apart(index, pose)?;
+        let mut reason = String::new();
+        for retakes in 0..=self.arms.options.max_retakes {
+            self.summary.retakes += u32::from(retakes > 0);
+            let targets = self
+                .arms
+                .targets_udeg(pose)
+                .ok_or_else(|| SessionError::OutOfReach {
+                    index,
+                    reason: "no turn of an azimuth lies within the soft limits".into(),
+                })?;
+            let tried = match self.shoot(targets, at_rest)? {
+                Ok(tried) => tried,
+                Err(error) => {
+                    self.arms.must_home |= matches!(
+                        &error,
+                        LinkError::Refused {
+                            refusal: Refusal::StartBeyondLimit(_),
+                            ..
+                        }
+                    );
+                    sort_error(index, error)?
+                }
+            };
+            match tried {
+                Try::Latched(latches) => {
+                    let shot = judge(index, retakes, targets, &latches);
+                    if shot.pointing_error_deg <= POINTING_LIMIT_DEG {
+                        return Ok(ShotOutcome::Kept(shot));
+                    }
+                    reason = format!("pointing error {:.4}°", shot.pointing_error_deg);
+                }
+                Try::Again(why) => reason = why,
+                Try::Broken(why) => {
+                    reason = why;
+                    self.summary.recoveries += 1;
+                    self.arms
+                        .recover()
+                        .map_err(|source| SessionError::Arms { index, source })?;
+                }
+            }
+        }
+        Ok(ShotOutcome::Refused { index, reason })
+    }
+
+    fn check_apart(&self, index: usize, pose: &Pose) -> Result<(), SessionError> {
+        let apart_deg = angle_between(pose.light.to_vec3(), pose.view.to_vec3()).to_degrees();
+        if apart_deg >= self.arms.keep_out_deg {
+            return Ok(());
+        }
+        Err(SessionError::OutOfReach {
             index,
             reason: format!(
                 "the arms would be {apart_deg:.1}° apart, and touch below {:.1}°",
-                arms.keep_out_deg
+                self.arms.keep_out_deg
             ),
-        });
+        })
     }
-    let mut reason = String::new();
-    for retakes in 0..=arms.options.max_retakes {
-        summary.retakes += u32::from(retakes > 0);
-        let targets = arms
-            .targets_udeg(pose)
-            .ok_or_else(|| SessionError::OutOfReach {
-                index,
-                reason: "no turn of an azimuth lies within the soft limits".into(),
-            })?;
-        let tried = match arms.shoot(targets) {
-            Ok(tried) => tried,
-            Err(error) => {
-                arms.must_home |= matches!(
-                    &error,
-                    LinkError::Refused {
-                        refusal: Refusal::StartBeyondLimit(_),
-                        ..
-                    }
-                );
-                sort_error(index, error)?
-            }
-        };
-        match tried {
-            Try::Latched(latches) => {
-                let shot = judge(index, retakes, targets, &latches);
-                if shot.pointing_error_deg <= POINTING_LIMIT_DEG {
-                    return Ok(ShotOutcome::Kept(shot));
-                }
-                reason = format!("pointing error {:.4}°", shot.pointing_error_deg);
-            }
-            Try::Again(why) => reason = why,
-            Try::Broken(why) => {
-                reason = why;
-                summary.recoveries += 1;
-                arms.recover()
-                    .map_err(|source| SessionError::Arms { index, source })?;
-            }
+
+    /// Move, rest, trigger. The outer error is that of `at_rest`.
+    fn shoot(
+        &mut self,
+        targets: [[i32; 2]; 2],
+        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
+    ) -> Result<Result<Try, LinkError>, SessionError> {
+        let began = Instant::now();
+        let moved = self.arms.go(targets);
+        self.busy += began.elapsed();
+        match moved {
+            Ok(None) => {}
+            Ok(Some(tried)) => return Ok(Ok(tried)),
+            Err(error) => return Ok(Err(error)),
         }
+        at_rest()?;
+        let began = Instant::now();
+        let tried = self.arms.trigger();
+        self.busy += began.elapsed();
+        Ok(tried)
     }
-    Ok(ShotOutcome::Refused { index, reason })
 }
 
 /// Which errors of the link a session can get over.

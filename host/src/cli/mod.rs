@@ -1,6 +1,7 @@
 //! The command line. Each command is one file; all end with exit code 0, with 1 after one line
 //! that says what is wrong and what to do, or with 2 for wrong usage.
 
+mod capture;
 mod chart;
 mod chart_motion;
 mod compare;
@@ -22,6 +23,7 @@ mod report;
 mod rivals;
 mod sim_device;
 mod table;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -43,6 +45,10 @@ enum Command {
     Demo(demo::Demo),
     /// Dry run: poses in travelling order, limits checked, time and disk estimated
     Plan(plan::Plan),
+    /// Measure a material: every pose, its frame, its samples; resumable after any end
+    Capture(capture::Capture),
+    /// Check a session: every checksum, every pose once, every sample
+    Verify(verify::Verify),
     /// Frames of a capture folder → samples
     Process(process::Process),
     /// One frame as seen from straight above, or merged from its exposures
@@ -94,6 +100,8 @@ fn start(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Demo(command) => command.run(),
         Command::Plan(command) => command.run(),
+        Command::Capture(command) => command.run(),
+        Command::Verify(command) => command.run(),
         Command::Process(command) => command.run(),
         Command::Rectify(command) => command.run(),
         Command::Fill(command) => command.run(),

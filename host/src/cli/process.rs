@@ -4,8 +4,11 @@ use super::progress::Progress;
 use super::table;
 use crate::dataset::samples::write_samples;
 use crate::dataset::summary::{FrameCounts, Refused};
-use crate::dataset::{CaptureFolder, Rig, Role, Scale, check_writable};
-use crate::process::{self, Compensation, FrameSource, Masks, Outcome, Processed, Stage};
+use crate::dataset::{CaptureFolder, FileError, FrameRow, Rig, Role, Scale, check_writable};
+use crate::process::{
+    self, Compensation, FrameSource, Hidden, Masks, Outcome, ProcessError, Processed, Stage,
+};
+use crate::session::SessionFolder;
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -28,29 +31,43 @@ pub struct Process {
 }
 
 /// Beside the samples of a session with reference frames: what hid the target in them.
-const MASKS: &str = "masks.csv";
+pub const MASKS: &str = "masks.csv";
 
 impl Process {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let folder = CaptureFolder::open(&self.folder)?;
         let output = self
             .output
+            .clone()
             .unwrap_or_else(|| self.folder.join("samples.npy"));
         let beside = super::fill::folder_of(&output).to_owned();
         check_writable(&beside)?;
-        let kept = self.folder.join(MASKS);
-        let masks = match self.masks.or(kept.is_file().then_some(kept)) {
-            Some(path) => Masks::read(&path, folder.rig())?,
-            None => Masks::default(),
-        };
         let mut progress = Progress::new();
-        let processed = run_with_masks(folder.rig(), &folder, &masks, &mut progress)?;
+        let has_frames = self.folder.join("frames.csv").is_file();
+        let (rig, processed) = if SessionFolder::is_session(&self.folder) && !has_frames {
+            if self.masks.is_some() {
+                bail!(
+                    "--masks: the frames of a session are sampled already, and masks come too late"
+                );
+            }
+            let session = SessionFolder::open(&self.folder)?;
+            let processed = run_on_session(&session, &mut progress)?;
+            (session.rig().clone(), processed)
+        } else {
+            let folder = CaptureFolder::open(&self.folder)?;
+            let kept = self.folder.join(MASKS);
+            let masks = match self.masks.or(kept.is_file().then_some(kept)) {
+                Some(path) => Masks::read(&path, folder.rig())?,
+                None => Masks::default(),
+            };
+            let processed = run_with_masks(folder.rig(), &folder, &masks, &mut progress)?;
+            (folder.rig().clone(), processed)
+        };
         progress.stage("writing samples", |_| {
             write_samples(&output, &processed.samples)
         })?;
         if !processed.masks.is_empty() {
-            processed.masks.write(&beside.join(MASKS), folder.rig())?;
+            processed.masks.write(&beside.join(MASKS), &rig)?;
         }
         let mut rows = describe(&processed);
         rows.push(("written".into(), output.display().to_string()));
@@ -70,11 +87,39 @@ fn run_with_masks(
     masks: &Masks,
     progress: &mut Progress,
 ) -> Result<Processed> {
-    let of_role = |role| source.rows().iter().filter(|row| row.role == role).count();
+    watched(source.rows(), progress, |tell| {
+        process::process_with_masks(rig, source, masks, tell)
+    })
+}
+
+/// The chain from a session's sampled frames to samples, with a bar.
+pub fn run_on_session(session: &SessionFolder, progress: &mut Progress) -> Result<Processed> {
+    let rows = session.rows()?;
+    let sampled = |row: &FrameRow, _: Hidden| {
+        let place = session.pose_done(row.role, row.frame as usize);
+        let place =
+            place.ok_or_else(|| FileError::new(session.folder(), "has changed", "start again"));
+        let frame = place.and_then(|place| session.frame(place));
+        frame.map_err(|source| ProcessError::Load {
+            frame: row.frame,
+            source,
+        })
+    };
+    watched(&rows, progress, |tell| {
+        process::process_sampled(session.rig(), &rows, &sampled, &Masks::default(), tell)
+    })
+}
+
+fn watched(
+    rows: &[FrameRow],
+    progress: &mut Progress,
+    work: impl FnOnce(&(dyn Fn(Stage, usize, usize) + Sync)) -> Result<Processed, ProcessError>,
+) -> Result<Processed> {
+    let of_role = |role| rows.iter().filter(|row| row.role == role).count();
     let reference = of_role(Role::Reference);
-    let total = source.rows().len().max(1);
+    let total = rows.len().max(1);
     let processed = progress.stage("frames to samples", |tell| {
-        process::process_with_masks(rig, source, masks, &|stage, done, _| {
+        work(&|stage, done, _| {
             let before = match stage {
                 Stage::Reference => 0,
                 Stage::Material => reference,
@@ -90,7 +135,7 @@ fn run_with_masks(
             .map_or("every point was left out".to_owned(), |r| r.reason);
         bail!(
             "none of the {} frames gave a sample: {why}; check rig.toml and the poses",
-            source.rows().len()
+            rows.len()
         );
     }
     Ok(processed)

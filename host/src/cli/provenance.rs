@@ -7,9 +7,10 @@ pub type Provenance = BTreeMap<String, String>;
 
 /// The facts that hold for any run of this program.
 pub fn of_this_program() -> Provenance {
-    Provenance::from([("version".to_owned(), version())])
+    Provenance::from([("version".to_owned(), program())])
 }
 
-fn version() -> String {
+/// This program with its version.
+pub fn program() -> String {
     format!("gonia {}", env!("CARGO_PKG_VERSION"))
 }

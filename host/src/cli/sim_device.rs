@@ -1,11 +1,14 @@
 //! `gonia sim-device`: simulated controllers on pseudo-terminals, in real time.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
+#[cfg(not(unix))]
+use anyhow::bail;
+use std::path::PathBuf;
 
 /// Simulates both controllers, with their arms, until it is stopped with Ctrl-C.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does."
+    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does.\n\nWith --frames and --rig a camera stands beside them: it leaves a frame of the demo's fabric in the\nfolder for every trigger pulse, as [source] kind = \"folder\" wants them."
 )]
 pub struct SimDevice {
     /// Offer the controllers on pseudo-terminals (the default)
@@ -14,13 +17,19 @@ pub struct SimDevice {
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Also be the camera: leave a frame in this folder for every trigger pulse
+    #[arg(long, value_name = "DIR", requires = "rig")]
+    frames: Option<PathBuf>,
+    /// The rig whose camera it is
+    #[arg(long, value_name = "RIG.toml", requires = "frames")]
+    rig: Option<PathBuf>,
 }
 
 #[cfg(not(unix))]
 impl SimDevice {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let _ = (self.pty, self.seed);
+        let _ = (self.pty, self.seed, self.frames, self.rig);
         bail!("this system has no pseudo-terminals: run it on Linux or macOS")
     }
 }
@@ -30,19 +39,29 @@ impl SimDevice {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         // There is one door, so the option only says aloud what happens anyhow.
-        let Self { pty: _, seed } = self;
-        ptys::serve(seed)
+        let camera = self.frames.as_deref().zip(self.rig.as_deref());
+        ptys::serve(self.seed, camera)
     }
 }
 
 #[cfg(unix)]
 mod ptys {
-    use super::{Result, bail};
-    use anyhow::Context;
+    use super::Result;
+    use crate::camera::simulated::{geometry_of, render};
+    use crate::dataset::frame_exr::write_frame;
+    use crate::dataset::rig_toml::read_rig;
+    use crate::dataset::{Role, check_writable};
+    use anyhow::{Context, bail};
+    use gonia_brdf::Pose;
+    use gonia_brdf::model::Kurt;
     use gonia_sim::fault::FaultPlan;
     use gonia_sim::rig::{Arm, SimPort, SimRig};
+    use gonia_sim::scene::Scene;
     use serialport::{SerialPort, TTYPort};
     use std::io::{ErrorKind, Read, Write};
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::mpsc::{Sender, channel};
     use std::time::{Duration, Instant};
 
     /// How long a turn waits for bytes of the host; the simulation is behind by no more.
@@ -55,8 +74,38 @@ mod ptys {
         _slave: TTYPort,
     }
 
-    pub fn serve(seed: u64) -> Result<()> {
+    /// Starts a camera that renders a frame for every pose it is sent, on a thread of its own, so that
+    /// the arms do not wait for it.
+    fn start_camera(folder: &Path, rig: &Path, seed: u64) -> Result<Sender<Pose>> {
+        let rig = read_rig(rig)?;
+        check_writable(folder)?;
+        let scene = Scene::new(
+            geometry_of(&rig),
+            Arc::new(Kurt::two_thread_fabric()),
+            Arc::new(Kurt::white_reference_fabric()),
+            seed,
+        );
+        let (exposed, poses) = channel();
+        let folder = folder.to_owned();
+        std::thread::spawn(move || {
+            for (number, pose) in poses.iter().enumerate() {
+                let frame = render(&scene, Role::Material, pose, number as u64);
+                let path = folder.join(format!("{number:06}.exr"));
+                if let Err(error) = write_frame(&path, &frame) {
+                    eprintln!("gonia: {error}");
+                }
+            }
+        });
+        Ok(exposed)
+    }
+
+    pub fn serve(seed: u64, camera: Option<(&Path, &Path)>) -> Result<()> {
         let rig = SimRig::new(seed, FaultPlan::default());
+        let camera = match camera {
+            Some((folder, rig)) => Some(start_camera(folder, rig, seed)?),
+            None => None,
+        };
+        let mut exposed = 0;
         let mut doors = Vec::new();
         for (arm, name) in [(Arm::Light, "light arm"), (Arm::Camera, "camera arm")] {
             let (mut master, slave) =
@@ -81,6 +130,14 @@ mod ptys {
             let now_us = began.elapsed().as_micros() as u64;
             for door in &mut doors {
                 door.answer(now_us)?;
+            }
+            if let Some(camera) = &camera
+                && rig.trigger_count() > exposed
+            {
+                for trigger in rig.triggers().split_off(exposed) {
+                    exposed += 1;
+                    camera.send(trigger.pose())?;
+                }
             }
         }
     }

@@ -4,6 +4,7 @@
 //! where in it, and what to do. Every writer goes through [`write_whole`], so that no half-written
 //! file ever stands under its final name.
 
+pub mod bench_setup;
 pub mod capture_folder;
 pub mod cell_mask;
 mod csv_table;
@@ -29,7 +30,7 @@ pub mod samples;
 mod samples_csv;
 mod samples_npy;
 pub mod summary;
-mod toml_text;
+pub(crate) mod toml_text;
 pub mod utia;
 pub mod whole_file;
 

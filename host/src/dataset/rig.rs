@@ -1,5 +1,6 @@
 //! `rig.toml`: where light, camera and target are.
 
+use super::bench_setup::{ArmPorts, SessionSettings, Source};
 use gonia_brdf::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,15 @@ pub struct Rig {
     pub sensor: Option<Sensor>,
     /// The grid of sampling points.
     pub sampling: Sampling,
+    /// The arms' controllers, for a session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arms: Option<ArmPorts>,
+    /// Where a session's frames come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<Source>,
+    /// How a session goes, where it differs from the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session: Option<SessionSettings>,
 }
 
 /// A point source.
@@ -207,6 +217,9 @@ impl Rig {
                 grid_mm: 14.0,
                 patch_mm: 14.0,
             },
+            arms: None,
+            source: None,
+            session: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `rig.toml`: reading, checking and writing a [`Rig`].
 
+use super::bench_setup::check_bench;
 use super::reflectance_csv::read_reflectance;
 use super::rig::{Reference, Rig, Sensor};
 use super::whole_file::write_whole_bytes;
@@ -60,6 +61,9 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         reference,
         sensor,
         sampling,
+        arms,
+        source,
+        session,
     } = rig;
     within("light.distance_m", light.distance_m, 0.01..=1000.0, "m")?;
     within("camera.distance_m", camera.distance_m, 0.01..=1000.0, "m")?;
@@ -166,7 +170,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
             remedy: "check the units: distances of the arms are in metres".into(),
         });
     }
-    Ok(())
+    check_bench(arms.as_ref(), source.as_ref(), session.as_ref())
 }
 
 fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {

@@ -9,7 +9,7 @@ use std::path::Path;
 /// # Errors
 /// Unreadable, not UTF-8, not TOML, or with unknown, missing or mistyped keys; the line is named
 /// where there is one.
-pub(super) fn read<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<T, FileError> {
+pub fn read<T: DeserializeOwned>(path: &Path, remedy: &str) -> Result<T, FileError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
     let text =
         String::from_utf8(bytes).map_err(|_| FileError::new(path, "is not UTF-8 text", remedy))?;

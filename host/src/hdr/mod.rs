@@ -12,7 +12,8 @@ pub use merge::Linearity;
 
 use crate::dataset::raw_frame::{RawFrame, read_raw};
 use crate::dataset::rig::Sensor;
-use crate::dataset::{CaptureFolder, FileError, Frame, FrameRow};
+use crate::dataset::{CaptureFolder, FileError, Frame, FrameRow, Rig};
+use std::path::{Path, PathBuf};
 
 /// Exposures that disagree by more than this share are not of a linear sensor, or not of what
 /// `rig.toml` and `frames.csv` say of them.
@@ -35,31 +36,44 @@ pub struct Radiance {
 /// One line naming the file: an exposure that cannot be read or is not of the rig's camera, no
 /// `[sensor]` in `rig.toml`, or exposures that disagree by more than 5 %.
 pub fn load_bracket(folder: &CaptureFolder, row: &FrameRow) -> Result<Radiance, FileError> {
-    let Some(sensor) = &folder.rig().sensor else {
+    let exposures = folder.exposures(row).iter();
+    let files: Vec<(f64, PathBuf)> = exposures
+        .map(|exposure| (exposure.exposure_s, folder.path_of_file(&exposure.file)))
+        .collect();
+    merge_files(folder.rig(), &files)
+}
+
+/// Reads raw exposures (seconds, file) of one frame of a rig and merges them; there must be at least
+/// one.
+///
+/// # Errors
+/// As [`load_bracket`].
+pub fn merge_files(rig: &Rig, files: &[(f64, PathBuf)]) -> Result<Radiance, FileError> {
+    let first = files.first().map_or(Path::new(""), |(_, path)| path);
+    let Some(sensor) = &rig.sensor else {
         return Err(FileError::new(
-            &folder.path_of(row),
+            first,
             "is a raw exposure, but rig.toml has no [sensor]",
             "give black_counts, saturation_counts, gain_e_per_count and read_noise_e there",
         ));
     };
-    let camera = &folder.rig().camera;
+    let camera = &rig.camera;
     let mut exposures = Vec::new();
-    for exposure in folder.exposures(row) {
-        let path = folder.path_of_file(&exposure.file);
-        let raw = read_raw(&path, camera.width_px, camera.height_px)?;
+    for (exposure_s, path) in files {
+        let raw = read_raw(path, camera.width_px, camera.height_px)?;
         if raw.channels == 3 && sensor.bayer.is_some() {
             return Err(FileError::new(
-                &path,
+                path,
                 "has three channels, but rig.toml gives the sensor a Bayer pattern",
                 "save the frame as it came from the sensor, or remove sensor.bayer",
             ));
         }
-        exposures.push((exposure.exposure_s, raw));
+        exposures.push((*exposure_s, raw));
     }
     let radiance = merge_bracket(&exposures, sensor);
     match radiance.linearity {
         Some(worst) if worst.deviation.abs() > LINEARITY_LIMIT => Err(FileError::new(
-            &folder.path_of(row),
+            first,
             format_args!(
                 "the exposures of {} s and {} s disagree by {:+.1} %",
                 worst.shorter_s,

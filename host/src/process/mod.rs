@@ -10,6 +10,7 @@ pub mod coverage;
 pub mod masks;
 mod reference;
 mod reflectance;
+pub mod sampled;
 pub mod source;
 #[cfg(test)]
 mod tests;
@@ -17,15 +18,15 @@ mod tests;
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
 pub use compensation::Compensation;
 pub use masks::Masks;
+pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
 pub use source::{FrameRow, FrameSource, Role};
 
 use crate::dataset::{FileError, Frame, Rig};
+use crate::vision::SamplingGrid;
 use crate::vision::ideal_light::IdealLight;
-use crate::vision::occlusion::find_occlusion;
-use crate::vision::{PointValue, Registrar, Registration, SamplingGrid};
 use compensation::Compensator;
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::{Direction, Pose, Sample};
+use gonia_brdf::{Direction, Sample};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -141,16 +142,37 @@ pub fn process_with_masks(
     masks: &Masks,
     progress: &(dyn Fn(Stage, usize, usize) + Sync),
 ) -> Result<Processed, ProcessError> {
-    let of_role =
-        |role| -> Vec<&FrameRow> { source.rows().iter().filter(|r| r.role == role).collect() };
+    let sampler = FrameSampler::new(rig);
+    let sampled = |row: &FrameRow, hidden: Hidden| {
+        let frame = load(rig, source, row)?;
+        Ok(sampler.sample(&frame, row, hidden))
+    };
+    process_sampled(rig, source.rows(), &sampled, masks, progress)
+}
+
+/// How a frame is had sampled, from any thread.
+pub type Sampled<'a> = &'a (dyn Fn(&FrameRow, Hidden) -> Result<SampledFrame, ProcessError> + Sync);
+
+/// As [`process_with_masks`], of frames that come sampled: a session's are kept so.
+pub fn process_sampled(
+    rig: &Rig,
+    rows: &[FrameRow],
+    sampled: Sampled,
+    masks: &Masks,
+    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+) -> Result<Processed, ProcessError> {
+    let of_role = |role| -> Vec<&FrameRow> { rows.iter().filter(|r| r.role == role).collect() };
     let (material, reference) = (of_role(Role::Material), of_role(Role::Reference));
     if material.is_empty() {
-        return Err(ProcessError::NoMaterial {
-            rows: source.rows().len(),
-        });
+        return Err(ProcessError::NoMaterial { rows: rows.len() });
     }
-    let bench = Bench::new(rig, source, masks);
-    let mut frames = Vec::with_capacity(source.rows().len());
+    let bench = Bench {
+        rig,
+        sampled,
+        masks,
+        grid: SamplingGrid::new(rig),
+    };
+    let mut frames = Vec::with_capacity(rows.len());
     let mut references = Vec::new();
     bench.each(
         Stage::Reference,
@@ -196,26 +218,35 @@ pub fn process_with_masks(
     })
 }
 
+/// Loads a frame, which must be of the size that the rig's camera has.
+fn load(rig: &Rig, source: &dyn FrameSource, row: &FrameRow) -> Result<Frame, ProcessError> {
+    let frame = source.load(row).map_err(|source| ProcessError::Load {
+        frame: row.frame,
+        source,
+    })?;
+    let camera = &rig.camera;
+    if [frame.width, frame.height] != [camera.width_px, camera.height_px] {
+        return Err(ProcessError::WrongSize {
+            frame: row.frame,
+            file: row.file.clone(),
+            width: frame.width,
+            height: frame.height,
+            rig_width: camera.width_px,
+            rig_height: camera.height_px,
+        });
+    }
+    Ok(frame)
+}
+
 /// What every frame needs.
 struct Bench<'a> {
     rig: &'a Rig,
-    source: &'a dyn FrameSource,
+    sampled: Sampled<'a>,
     masks: &'a Masks,
-    registrar: Registrar,
     grid: SamplingGrid,
 }
 
-impl<'a> Bench<'a> {
-    fn new(rig: &'a Rig, source: &'a dyn FrameSource, masks: &'a Masks) -> Self {
-        Self {
-            rig,
-            source,
-            masks,
-            registrar: Registrar::new(rig),
-            grid: SamplingGrid::new(rig),
-        }
-    }
-
+impl Bench<'_> {
     /// Does `work` on rows in parallel, and `gather`s what it gives in their order.
     fn each<T: Send>(
         &self,
@@ -243,50 +274,18 @@ impl<'a> Bench<'a> {
         Ok(())
     }
 
-    fn load(&self, row: &FrameRow) -> Result<Frame, ProcessError> {
-        let frame = self.source.load(row).map_err(|source| ProcessError::Load {
-            frame: row.frame,
-            source,
-        })?;
-        let camera = &self.rig.camera;
-        if [frame.width, frame.height] != [camera.width_px, camera.height_px] {
-            return Err(ProcessError::WrongSize {
-                frame: row.frame,
-                file: row.file.clone(),
-                width: frame.width,
-                height: frame.height,
-                rig_width: camera.width_px,
-                rig_height: camera.height_px,
-            });
-        }
-        Ok(frame)
-    }
-
     fn reference(
         &self,
         row: &FrameRow,
     ) -> Result<(FrameReport, Option<ReferenceFrame>), ProcessError> {
-        let frame = self.load(row)?;
-        let registration = self.registrar.register(&frame, row.pose);
-        let report = report(row, &registration);
+        let frame = (self.sampled)(row, Hidden::Find)?;
+        let report = frame.report;
         if let Outcome::Refused(_) = report.outcome {
             return Ok((report, None));
         }
-        let mask = find_occlusion(&frame, &registration, row.pose.light, self.rig);
-        let points = self.grid.sample(&frame, &registration, mask.as_ref());
         let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
-        let pose = Pose {
-            light: row.pose.light,
-            view: registration.view,
-        };
-        let reference = ReferenceFrame::new(
-            row.pose,
-            pose,
-            &points,
-            |i, value| light.irradiance(self.place(i, value)),
-            mask,
-        );
-        Ok((report, Some(reference)))
+        let irradiance = |i, value: &SampledPoint| light.irradiance(self.place(i, value));
+        Ok((report, Some(ReferenceFrame::new(frame, irradiance))))
     }
 
     fn material(
@@ -295,9 +294,16 @@ impl<'a> Bench<'a> {
         compensator: &Compensator,
     ) -> Result<(FrameReport, Vec<Sample>, LeftOutCounts), ProcessError> {
         let reference = compensator.reference_at(row.pose);
-        let frame = self.load(row)?;
-        let registration = self.registrar.register(&frame, row.pose);
-        let mut report = report(row, &registration);
+        // What hid the reference hid the material, and those points are left out already. Without
+        // both, the material's own frame must tell.
+        let hidden = match (reference, self.masks.at(row.pose)) {
+            (Some(_), _) => Hidden::Known(None),
+            (None, Some(known)) => Hidden::Known(known),
+            (None, None) => Hidden::Find,
+        };
+        let frame = (self.sampled)(row, hidden)?;
+        let view = frame.view;
+        let mut report = frame.report;
         let mut counts = LeftOutCounts::default();
         if let Outcome::Refused(_) = report.outcome {
             return Ok((report, Vec::new(), counts));
@@ -306,18 +312,7 @@ impl<'a> Bench<'a> {
             report.outcome = Outcome::Refused(Refusal::NoReference);
             return Ok((report, Vec::new(), counts));
         }
-        // What hid the reference hid the material, and those points are left out already. Without
-        // both, the material's own frame must tell.
-        let known = self.masks.at(row.pose);
-        let own = match (reference, known) {
-            (None, None) => find_occlusion(&frame, &registration, row.pose.light, self.rig),
-            _ => None,
-        };
-        let mask = match reference {
-            Some(_) => None,
-            None => own.as_ref().or(known.flatten()),
-        };
-        let points = self.grid.sample(&frame, &registration, mask);
+        let points = frame.points;
         let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
         let mut samples = Vec::with_capacity(points.len());
         for (i, point) in points.iter().enumerate() {
@@ -334,7 +329,7 @@ impl<'a> Bench<'a> {
                 counts.below_horizon += 1;
                 continue;
             }
-            let (to_light, to_camera) = self.directions(row.pose.light, registration.view, at);
+            let (to_light, to_camera) = self.directions(row.pose.light, view, at);
             let relative = value.rgb.map(|v| v / irradiance as f32);
             let Some(rgb) =
                 compensator.value(relative, reference, i, (to_light, to_camera), &mut counts)
@@ -358,7 +353,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Where on the target a point's pixels were, mm.
-    fn place(&self, point: usize, value: &PointValue) -> [f64; 2] {
+    fn place(&self, point: usize, value: &SampledPoint) -> [f64; 2] {
         let at = self.grid.points_mm()[point];
         [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]))
     }
@@ -375,16 +370,6 @@ impl<'a> Bench<'a> {
             local_direction(light, self.rig.light.distance_m, at),
             local_direction(view, self.rig.camera.distance_m, at),
         )
-    }
-}
-
-fn report(row: &FrameRow, registration: &Registration) -> FrameReport {
-    FrameReport {
-        frame: row.frame,
-        role: row.role,
-        outcome: Outcome::of(registration),
-        residual_px: registration.residual_px,
-        pose_offset: registration.pose_offset,
     }
 }
 

@@ -1,7 +1,8 @@
 //! What the frames of the reference tell: its radiance at every grid point of every pose.
 
 use super::account::LeftOutCounts;
-use crate::vision::{LeftOut, Mask, PointValue};
+use super::sampled::{SampledFrame, SampledPoint};
+use crate::vision::{LeftOut, Mask};
 use gonia_brdf::direction::{angle_between, wrap_deg};
 use gonia_brdf::{Direction, Pose};
 
@@ -28,15 +29,9 @@ pub struct ReferenceFrame {
 }
 
 impl ReferenceFrame {
-    /// From a frame's points and the ideal light's irradiance at each of them.
-    pub fn new(
-        reading: Pose,
-        pose: Pose,
-        points: &[Result<PointValue, LeftOut>],
-        irradiance: impl Fn(usize, &PointValue) -> f64,
-        mask: Option<Mask>,
-    ) -> Self {
-        let relative = |(i, point): (usize, &Result<PointValue, LeftOut>)| match point {
+    /// From a frame and the ideal light's irradiance at each of its points.
+    pub fn new(frame: SampledFrame, irradiance: impl Fn(usize, &SampledPoint) -> f64) -> Self {
+        let relative = |(i, point): (usize, &Result<SampledPoint, LeftOut>)| match point {
             Ok(value) => {
                 let scale = 1.0 / irradiance(i, value) as f32;
                 value.rgb.map(|v| v * scale)
@@ -44,11 +39,14 @@ impl ReferenceFrame {
             Err(_) => [f32::NAN; 3],
         };
         Self {
-            reading,
-            pose,
-            relative: points.iter().enumerate().map(relative).collect(),
-            missing: points.iter().map(|p| p.err()).collect(),
-            mask,
+            reading: frame.reading,
+            pose: Pose {
+                light: frame.reading.light,
+                view: frame.view,
+            },
+            relative: frame.points.iter().enumerate().map(relative).collect(),
+            missing: frame.points.iter().map(|p| p.err()).collect(),
+            mask: frame.mask,
         }
     }
 

@@ -1,0 +1,33 @@
+//! A session as a folder that a person can read, and that no death of the program harms.
+//!
+//! | file | holds | written |
+//! |---|---|---|
+//! | `rig.toml`, `plan.csv` | the rig and the poses, as the session began with them | whole |
+//! | `provenance.toml` | versions, controllers and their settings' checksums, camera, seed | whole |
+//! | `journal.log` | start, pose, event, stop: a line each, checksummed | appended, synced a line |
+//! | `frames.bin` | what each frame showed at the grid points ([`record`]) | appended, synced a frame |
+//! | `lock` | held while a capture runs | – |
+//!
+//! A pose is done when its line is in the journal, and its line is written after its frame is on the
+//! disk. What a killed program leaves behind the last whole line is cut off when it goes on.
+
+mod clock;
+mod entry;
+mod folder;
+mod journal;
+mod provenance;
+pub mod record;
+mod verify;
+mod writer;
+
+pub use entry::{End, Entry, PoseDone};
+pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
+pub use provenance::{ControllerIdentity, Provenance};
+pub use verify::{Finding, Verdict, verify};
+pub use writer::{Beginning, Claim, SessionWriter};
+
+/// The checksum of the wire, CRC-32C, also of everything here.
+fn crc32c(bytes: &[u8]) -> u32 {
+    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
+    CRC.checksum(bytes)
+}

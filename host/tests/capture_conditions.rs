@@ -1,0 +1,387 @@
+//! What a session gets over by itself, and what ends it in good order.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+#[path = "common/session.rs"]
+mod session;
+
+use gonia::camera::{Camera, CameraError, RenderingCamera};
+use gonia::capture::{Arms, Capture, Ended, Orders, Told, Watch};
+use gonia::dataset::{Frame, FrameRow, Rig};
+use gonia::session::{
+    Beginning, Claim, ControllerIdentity, End, Entry, Provenance, SessionFolder, SessionWriter,
+    verify,
+};
+use gonia_protocol::settings::Axis;
+use gonia_sim::bench::Bench;
+use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
+use gonia_sim::rig::SimRig;
+use session::{small_plan, small_rig};
+use std::path::Path;
+
+const POSES: usize = 12;
+
+/// What the camera does at its calls of `fetch` (counted from 0), when it has seen the first pose so
+/// often before.
+type Trouble = fn(u32, u32) -> Option<Act>;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Act {
+    /// No frame comes.
+    Late,
+    /// A frame that nobody asked for comes after it.
+    Extra,
+    /// The lamp is darker.
+    Dark,
+    /// Something was moved.
+    Moved,
+}
+
+struct Troubled {
+    camera: RenderingCamera,
+    trouble: Trouble,
+    calls: u32,
+    first_pose: u32,
+    extra: usize,
+    changes: bool,
+}
+
+impl Camera for Troubled {
+    fn identity(&self) -> String {
+        "troubled".into()
+    }
+
+    fn ready(&mut self, _: usize) -> Result<usize, CameraError> {
+        Ok(std::mem::take(&mut self.extra))
+    }
+
+    fn fetch(&mut self, shot: &FrameRow, exposures_s: &[f64]) -> Result<Frame, CameraError> {
+        let act = (self.trouble)(self.calls, self.first_pose);
+        self.calls += 1;
+        self.first_pose += u32::from(shot.frame == 0);
+        let mut frame = self.camera.fetch(shot, exposures_s)?;
+        match act {
+            Some(Act::Late) => {
+                return Err(CameraError::Late {
+                    came: 0,
+                    expected: 1,
+                    timeout_s: 0.0,
+                });
+            }
+            Some(Act::Extra) => self.extra = 1,
+            Some(Act::Dark) => {
+                for pixel in &mut frame.rgb {
+                    *pixel = pixel.map(|v| 0.9 * v);
+                }
+            }
+            Some(Act::Moved) => {
+                // The light comes from elsewhere: one side darker, the other brighter.
+                for (i, pixel) in frame.rgb.iter_mut().enumerate() {
+                    let share = 0.5 + (i % 100) as f32 / 100.0;
+                    *pixel = pixel.map(|v| share * v);
+                }
+            }
+            None => {}
+        }
+        Ok(frame)
+    }
+
+    fn reopen(&mut self) -> Result<(), CameraError> {
+        Ok(())
+    }
+
+    fn changes_the_sample(&self) -> bool {
+        self.changes
+    }
+}
+
+struct Nobody;
+
+impl Watch for Nobody {
+    fn tell(&self, _: &Told) {}
+}
+
+fn begin(folder: &Path, rig: &Rig) -> SessionWriter {
+    let arm = ControllerIdentity {
+        board: "sim".into(),
+        firmware: String::new(),
+        config_crc: String::new(),
+    };
+    let provenance = Provenance {
+        program: "test".into(),
+        began: String::new(),
+        rig_crc: String::new(),
+        plan_crc: String::new(),
+        reference: rig.session.as_ref().unwrap().reference,
+        camera: "troubled".into(),
+        seed: Some(1),
+        light_arm: arm.clone(),
+        camera_arm: arm,
+    };
+    let rig = toml_of(rig);
+    let beginning = Beginning {
+        rig: rig.as_bytes(),
+        beside: None,
+        plan: &small_plan(POSES),
+        provenance: &provenance,
+    };
+    let mut writer = Claim::new(folder, None).unwrap().begin(beginning).unwrap();
+    writer.note(&Entry::Start("test".into())).unwrap();
+    writer
+}
+
+fn toml_of(rig: &Rig) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rig.toml");
+    gonia::dataset::rig_toml::write_rig(&path, rig).unwrap();
+    std::fs::read_to_string(path).unwrap()
+}
+
+fn run(
+    folder: &Path,
+    writer: SessionWriter,
+    faults: FaultPlan,
+    trouble: Trouble,
+    orders: &Orders,
+    changes: bool,
+) -> Ended {
+    let session = SessionFolder::open(folder).unwrap();
+    let rig = session.rig().clone();
+    let arms = [(); 2].map(|()| Bench::quiet_arm_near_home());
+    let sim = SimRig::with_arms(1, faults, arms);
+    let mut arms = Arms::connect(
+        Box::new(sim.port(Arm::Light)),
+        Box::new(sim.port(Arm::Camera)),
+    )
+    .unwrap();
+    let camera = Troubled {
+        camera: RenderingCamera::new(&rig, sim, 1, POSES, true),
+        trouble,
+        calls: 0,
+        first_pose: 0,
+        extra: 0,
+        changes,
+    };
+    let capture = Capture {
+        rig: &rig,
+        settings: rig.session.as_ref().unwrap(),
+        keep_frames: None,
+        exact: true,
+        orders,
+        watch: &Nobody,
+    };
+    capture
+        .run(&mut arms, Box::new(camera), writer, &session)
+        .unwrap()
+}
+
+/// A session of the material alone under some trouble; its folder, and how it ended.
+fn under(trouble: Trouble, faults: FaultPlan) -> (tempfile::TempDir, Ended) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().reference = false;
+    let writer = begin(folder.path(), &rig);
+    let orders = Orders::default();
+    let ended = run(folder.path(), writer, faults, trouble, &orders, true);
+    (folder, ended)
+}
+
+/// The frames' checksums, by pose.
+fn crcs(folder: &Path) -> Vec<(usize, u32)> {
+    let session = SessionFolder::open(folder).unwrap();
+    session.done().map(|p| (p.index, p.crc)).collect()
+}
+
+fn quiet(_: u32, _: u32) -> Option<Act> {
+    None
+}
+
+fn journal(folder: &Path) -> String {
+    std::fs::read_to_string(folder.join("journal.log")).unwrap()
+}
+
+#[test]
+fn missing_and_extra_frames_are_noticed_and_their_poses_taken_again() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    let (folder, ended) = under(
+        |call, _| match call {
+            2 => Some(Act::Late),
+            6 => Some(Act::Extra),
+            _ => None,
+        },
+        FaultPlan::default(),
+    );
+    assert_eq!(
+        (ended.end, ended.retaken),
+        (End::Finished, 2),
+        "{}",
+        ended.reason
+    );
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert!(
+        text.contains("0 of 1 frames came") && text.contains("belong to no trigger"),
+        "{text}"
+    );
+}
+
+#[test]
+fn poses_measured_under_a_darker_lamp_are_measured_again_when_it_is_back() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    // The lamp comes back after the second look at the control pose.
+    let (folder, ended) = under(
+        |call, first_pose| (call > 3 && first_pose < 3).then_some(Act::Dark),
+        FaultPlan::default(),
+    );
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert!(
+        text.contains(" void since=") && text.contains("the lamp has drifted"),
+        "{text}"
+    );
+    assert_eq!(verify(folder.path()).unwrap().broken().count(), 0);
+}
+
+#[test]
+fn a_lamp_that_stays_dark_a_moved_sample_and_a_dead_camera_end_the_session_with_their_reason() {
+    for (trouble, said) in [
+        (
+            (|call, _| (call > 3).then_some(Act::Dark)) as Trouble,
+            "the lamp stays other",
+        ),
+        (
+            |call, _| (call > 3).then_some(Act::Moved),
+            "the control pose is not what it was",
+        ),
+        (
+            |call, _| (call > 3).then_some(Act::Late),
+            "tried 4 times in vain",
+        ),
+    ] {
+        let (folder, ended) = under(trouble, FaultPlan::default());
+        assert_eq!(ended.end, End::Failed, "{said}: {}", ended.reason);
+        assert!(ended.reason.contains(said), "{}", ended.reason);
+        let text = journal(folder.path());
+        assert!(
+            text.lines().last().unwrap().contains("stop failed"),
+            "{text}"
+        );
+        // Nothing doubtful was kept: what is there is what a calm session has.
+        let (calm, _) = under(quiet, FaultPlan::default());
+        let expected = crcs(calm.path());
+        assert!(
+            crcs(folder.path())
+                .iter()
+                .all(|pose| expected.contains(pose))
+        );
+    }
+}
+
+#[test]
+fn a_fault_and_a_cable_that_was_out_are_got_over() {
+    let (calm, clear) = under(quiet, FaultPlan::default());
+    let middle_us = clear.arms.duration_us / 2;
+    let at = |us, fault| FaultEvent {
+        at_us: us,
+        arm: Arm::Camera,
+        fault,
+    };
+    let lost = Fault::EncoderLost {
+        axis: Axis::Theta,
+        for_us: 300_000,
+    };
+    let plan = FaultPlan {
+        events: vec![
+            at(middle_us, lost),
+            at(
+                middle_us + 20_000_000,
+                Fault::Unplugged { for_us: 5_000_000 },
+            ),
+        ],
+        ..FaultPlan::default()
+    };
+    let (folder, ended) = under(quiet, plan);
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert!(ended.arms.recoveries > 0);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+}
+
+#[test]
+fn a_full_disk_ends_the_session_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().disk_reserve_mb = u64::MAX / 2;
+    let writer = begin(folder.path(), &rig);
+    let orders = Orders::default();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(ended.end, End::Failed);
+    assert!(ended.reason.contains("MB are reserved"), "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), []);
+}
+
+#[test]
+fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = begin(folder.path(), &small_rig());
+    let orders = Orders::default();
+    let first = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        false,
+    );
+    assert_eq!(first.end, End::Paused);
+    assert!(first.reason.contains("put the material on the target"));
+    assert_eq!(verify(folder.path()).unwrap().done, POSES);
+    let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
+    let second = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        false,
+    );
+    assert_eq!(second.end, End::Finished, "{}", second.reason);
+    assert_eq!(verify(folder.path()).unwrap().done, 2 * POSES);
+}
+
+#[test]
+fn orders_end_a_session_and_it_goes_on_from_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = begin(folder.path(), &small_rig());
+    let orders = Orders::default();
+    orders.interrupt();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(
+        (ended.end, ended.reason.as_str()),
+        (End::Paused, "by Ctrl-C")
+    );
+    let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
+    let orders = Orders::default();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+}

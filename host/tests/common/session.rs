@@ -1,0 +1,46 @@
+//! A small session on the simulated rig.
+
+use gonia::dataset::Rig;
+use gonia::dataset::bench_setup::{SessionSettings, Source};
+use gonia::dataset::plan_csv::write_plan_csv;
+use gonia::dataset::rig::Reference;
+use gonia::dataset::rig_toml::write_rig;
+use gonia_brdf::{Direction, Pose};
+use std::path::Path;
+
+/// A rig whose frames are small, and whose every take is the same.
+pub fn small_rig() -> Rig {
+    let mut rig = Rig::paper(100);
+    rig.sampling.grid_mm = 40.0;
+    rig.sampling.patch_mm = 28.0;
+    rig.reference = Some(Reference::Reflectance([0.9, 0.8, 0.7]));
+    rig.source = Some(Source::Simulated {
+        seed: 1,
+        exact: true,
+    });
+    rig.session = Some(SessionSettings {
+        control_every: 7,
+        pause_s: 1.0,
+        max_retries: 3,
+        disk_reserve_mb: 1,
+        ..SessionSettings::default()
+    });
+    rig
+}
+
+/// Poses near each other, so that the arms are quick.
+pub fn small_plan(n: usize) -> Vec<Pose> {
+    (0..n)
+        .map(|i| Pose {
+            light: Direction::from_deg(25.0 + (i % 5) as f64, 170.0 + (i / 5) as f64),
+            view: Direction::from_deg(10.0 + (i % 3) as f64, 175.0),
+        })
+        .collect()
+}
+
+/// Writes rig.toml and plan.csv into a folder.
+#[allow(dead_code)]
+pub fn write_small(folder: &Path, rig: &Rig, n: usize) {
+    write_rig(&folder.join("rig.toml"), rig).unwrap();
+    write_plan_csv(&folder.join("plan.csv"), &small_plan(n)).unwrap();
+}
