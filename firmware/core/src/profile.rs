@@ -81,7 +81,7 @@ impl Ramp {
         let (mut ramp_ms, rise_ms) = (self.ramp_ms, self.rise_ms);
         if cruise_ms < ramp_ms + rise_ms {
             // Too short for full speed: N = a·p·r with p = r + j.
-            let area = (steps * self.ms2_per_step >> AREA_BITS) + 1;
+            let area = ((steps * self.ms2_per_step) >> AREA_BITS) + 1;
             let root = (rise_ms * rise_ms + 4 * area).isqrt();
             ramp_ms = ramp_ms.min((root - rise_ms) / 2 + 1);
         }

@@ -12,7 +12,7 @@ const TOP: f64 = 30.0;
 const BOTTOM: f64 = 44.0;
 
 const STYLE: &str = "text{font:11px system-ui,sans-serif;fill:#1d2326}.small{font-size:10px;fill:#5c676b}\
-.title{font-size:13px;font-weight:600}.tick{stroke:#9aa5a8}.limit{stroke:#b3392f;stroke-dasharray:4 3}\
+.title{font-size:13px;font-weight:600}.tick{stroke:#9aa5a8}\
 .curve{stroke:#2f7f74;fill:none;stroke-width:1.5}.span{stroke:#2f7f74;stroke-width:4;opacity:.18}\
 .dot{fill:#2f7f74}.default{fill:#b98a1d}";
 
@@ -43,9 +43,10 @@ fn svg_background(w: f64, h: f64) -> Markup {
     html! { rect x="0" y="0" width=(svg::n(w)) height=(svg::n(h)) fill="#ffffff" {} }
 }
 
-/// The plotting area of a panel: both axes begin at zero.
+/// The plotting area of a panel: x begins at zero, y where the values do.
 struct Plot {
     x_most: f64,
+    y_least: f64,
     y_most: f64,
 }
 
@@ -55,23 +56,25 @@ impl Plot {
     }
 
     fn y(&self, value: f64) -> f64 {
-        H - BOTTOM - (value / self.y_most).clamp(0.0, 1.0) * (H - TOP - BOTTOM)
+        let share = (value - self.y_least) / (self.y_most - self.y_least);
+        H - BOTTOM - share.clamp(0.0, 1.0) * (H - TOP - BOTTOM)
     }
 
     fn frame(&self, title: &str, x_name: &str, y_name: &str) -> Markup {
-        let ticks = |most: f64| {
-            let step = svg::round_up(most / 5.0);
-            (0..=(most / step + 1e-9) as usize).map(move |k| k as f64 * step)
+        let ticks = |least: f64, most: f64| {
+            let step = svg::round_up((most - least) / 5.0);
+            let first = (least / step - 1e-9).ceil() as usize;
+            (first..=(most / step + 1e-9) as usize).map(move |k| k as f64 * step)
         };
         html! {
             (svg::text(LEFT, 16.0, "start", "title", title))
             (svg::line(LEFT, H - BOTTOM, W - RIGHT, H - BOTTOM, "tick"))
             (svg::line(LEFT, TOP, LEFT, H - BOTTOM, "tick"))
-            @for value in ticks(self.x_most) {
+            @for value in ticks(0.0, self.x_most) {
                 (svg::line(self.x(value), H - BOTTOM, self.x(value), H - BOTTOM + 4.0, "tick"))
                 (svg::text(self.x(value), H - BOTTOM + 16.0, "middle", "small", &short(value)))
             }
-            @for value in ticks(self.y_most) {
+            @for value in ticks(self.y_least, self.y_most) {
                 (svg::line(LEFT - 4.0, self.y(value), LEFT, self.y(value), "tick"))
                 (svg::text(LEFT - 7.0, self.y(value) + 3.5, "end", "small", &short(value)))
             }
@@ -88,7 +91,7 @@ impl Plot {
         html! { polyline points=(path.join(" ")) class="curve" {} }
     }
 
-    fn dot(&self, x: f64, y: f64, is_default: bool, label: &str) -> Markup {
+    fn dot(&self, x: f64, y: f64, is_default: bool) -> Markup {
         let (class, radius) = if is_default {
             ("default", "5.5")
         } else {
@@ -96,9 +99,39 @@ impl Plot {
         };
         html! {
             circle cx=(svg::n(self.x(x))) cy=(svg::n(self.y(y))) r=(radius) class=(class) {}
-            (svg::text(self.x(x) + 6.0, self.y(y) - 5.0, "start", "small", label))
         }
     }
+
+    /// Labels at the right of places, the first ones first; one that would lie on another is left out.
+    fn labels(&self, labels: &[(f64, f64, String)]) -> Markup {
+        let mut taken: Vec<(f64, f64)> = Vec::new();
+        let mut drawn = Vec::new();
+        for (x, y, label) in labels {
+            let at = (self.x(*x) + 8.0, self.y(*y) + 3.5);
+            let is_free = |other: &(f64, f64)| {
+                (other.0 - at.0).abs() > LABEL_W || (other.1 - at.1).abs() > LABEL_H
+            };
+            if taken.iter().all(is_free) {
+                taken.push(at);
+                drawn.push(svg::text(at.0, at.1, "start", "small", label));
+            }
+        }
+        html! { @for label in &drawn { (label) } }
+    }
+}
+
+/// Room that a label takes.
+const LABEL_W: f64 = 34.0;
+const LABEL_H: f64 = 10.0;
+
+/// A range that shows the differences of values: from a little below the least to a little above.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (least, most) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+    if least > most {
+        return (0.0, 1.0);
+    }
+    let room = 0.08 * (most - least).max(0.05 * most);
+    ((least - room).max(0.0), most + room)
 }
 
 fn setting_panel(rows: &[MotionRow], poses: usize, limit_deg: f64) -> Markup {
@@ -109,42 +142,71 @@ fn setting_panel(rows: &[MotionRow], poses: usize, limit_deg: f64) -> Markup {
         .filter(|row| row.stopped.is_none() && row.given_up == 0)
         .collect();
     let most = |of: &dyn Fn(&MotionRow) -> f64| whole.iter().map(|row| of(row)).fold(0.0, f64::max);
+    let (y_least, y_most) = range(whole.iter().map(|row| hours(row)));
     let plot = Plot {
-        x_most: most(&|row| row.max_deg).max(limit_deg) * 1.08,
-        y_most: svg::round_up(most(&hours)),
+        x_most: most(&|row| row.max_deg).max(0.3 * limit_deg) * 1.2,
+        y_least,
+        y_most,
     };
+    let x_name = format!(
+        "true pointing error, deg: median to largest, 99 % at the dot (limit {})",
+        short(limit_deg)
+    );
     let unit = rows.first().map_or("", |row| row.unit);
     let title = format!("{} ({unit})", rows.first().map_or("", |row| row.setting));
     let points: Vec<(f64, f64)> = whole.iter().map(|row| (row.p99_deg, hours(row))).collect();
+    // The default's label, and the ends', before those in between.
+    let ends = whole.first().into_iter().chain(whole.last());
+    let by_weight = whole
+        .iter()
+        .filter(|row| row.is_default)
+        .chain(ends)
+        .chain(&whole);
+    let labels: Vec<(f64, f64, String)> = by_weight
+        .map(|row| (row.max_deg, hours(row), short(row.value)))
+        .collect();
     html! {
-        (plot.frame(&title, "true pointing error, deg: median to largest, 99 % at the dot", "hours"))
-        (svg::line(plot.x(limit_deg), TOP, plot.x(limit_deg), H - BOTTOM, "limit"))
+        (plot.frame(&title, &x_name, "hours"))
         @for row in &whole {
             (svg::line(plot.x(row.p50_deg), plot.y(hours(row)), plot.x(row.max_deg), plot.y(hours(row)), "span"))
         }
         (plot.curve(&points))
         @for row in &whole {
-            (plot.dot(row.p99_deg, hours(row), row.is_default, &short(row.value)))
+            (plot.dot(row.p99_deg, hours(row), row.is_default))
         }
+        (plot.labels(&labels))
     }
 }
 
 fn jerk_panel(rows: &[JerkRow]) -> Markup {
     let rise_ms = |row: &JerkRow| f64::from(row.rise_ms);
-    let most = |of: &dyn Fn(&JerkRow) -> f64| rows.iter().map(of).fold(0.0, f64::max);
+    let (y_least, y_most) = range(rows.iter().map(|row| row.settled_s));
     let plot = Plot {
-        x_most: most(&rise_ms) * 1.12,
-        y_most: most(&|row| row.settled_s) * 1.1,
+        x_most: rows.iter().map(rise_ms).fold(1.0, f64::max) * 1.2,
+        y_least,
+        y_most,
     };
+    let of_the_curve = |rows: &[JerkRow]| {
+        rows.last().map(|row| {
+            (
+                rise_ms(row),
+                row.settled_s,
+                format!("{} deg/s2", row.acceleration),
+            )
+        })
+    };
+    let curves = || rows.chunk_by(|a, b| a.acceleration == b.acceleration);
+    let labels: Vec<(f64, f64, String)> = curves().filter_map(of_the_curve).collect();
     html! {
-        (plot.frame("jerk", "acceleration_rise (ms); 0: trapezoid", "s"))
-        @for rows in rows.chunk_by(|a, b| a.acceleration == b.acceleration) {
+        (plot.frame("a move until it has settled, arms of 6 to 16 Hz", "acceleration_rise (ms); 0: trapezoid", "s"))
+        @for rows in curves() {
             @let points: Vec<(f64, f64)> = rows.iter().map(|row| (rise_ms(row), row.settled_s)).collect();
             (plot.curve(&points))
             @for row in rows {
-                (plot.dot(rise_ms(row), row.settled_s, row.is_default, ""))
+                (plot.dot(rise_ms(row), row.settled_s, row.is_default))
             }
         }
+        (plot.labels(&labels))
     }
 }
 
