@@ -120,3 +120,49 @@ impl Camera for CommandCamera {
         true
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::dataset::Role;
+    use crate::dataset::frame_exr::write_frame;
+    use gonia_brdf::{Direction, Pose};
+
+    fn fetch(run: &[&str], timeout_s: f64) -> Result<Frame, CameraError> {
+        let run = run.iter().map(|word| (*word).to_owned()).collect();
+        let up = Direction::from_deg(0.0, 0.0);
+        let row = FrameRow {
+            frame: 3,
+            role: Role::Material,
+            pose: Pose {
+                light: up,
+                view: up,
+            },
+            file: String::new(),
+        };
+        CommandCamera::new(&Rig::paper(32), run, timeout_s).fetch(&row, &[0.01])
+    }
+
+    #[test]
+    fn a_program_leaves_the_frame_of_its_pose_or_says_why_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let frame = Frame {
+            width: 32,
+            height: 32,
+            rgb: vec![[0.5; 3]; 32 * 32],
+        };
+        write_frame(&folder.path().join("material_3.exr"), &frame).unwrap();
+        let from = folder.path().join("{role}_{index}.exr");
+        let from = from.to_str().unwrap();
+        assert_eq!(fetch(&["cp", from, "{file}.exr"], 10.0), Ok(frame));
+        for (run, said) in [
+            (&["false", "{file}"][..], "ended with"),
+            (&["true", "{file}"], "left 0 files where 1 are due"),
+            (&["no-such-program", "{file}"], "cannot be run"),
+            (&["sleep", "30"], "did not end within 0.05 s"),
+        ] {
+            let error = fetch(run, if run[0] == "sleep" { 0.05 } else { 10.0 }).unwrap_err();
+            assert!(error.to_string().contains(said), "{error}");
+        }
+    }
+}

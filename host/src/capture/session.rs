@@ -163,6 +163,18 @@ impl<'a> Shooter<'a> {
         homed.map_err(|source| SessionError::Arms { index: 0, source })
     }
 
+    /// Takes up arms that may still be under way for a host that died, or have stopped because it
+    /// did: they are stopped, cleared, and homed if they lost their place.
+    ///
+    /// # Errors
+    /// Arms that cannot be brought back.
+    pub fn take_up(&mut self) -> Result<(), HomeError> {
+        let began = Instant::now();
+        let taken = self.arms.recover();
+        self.busy += began.elapsed();
+        taken
+    }
+
     /// Brings the arms back after a fault, a restart or a lost cable.
     ///
     /// # Errors

@@ -147,15 +147,11 @@ impl Capture<'_> {
     }
 
     fn home(&self, shooter: &mut Shooter) -> Result<(), Halt> {
-        let homed = shooter.home();
-        homed.map_err(|error| {
+        shooter.take_up().map_err(|error| {
             if self.orders.ends() {
                 return Halt::Stopped("by Ctrl-C, while homing".into());
             }
-            match error {
-                SessionError::Arms { source, .. } => Halt::Failed(source.to_string()),
-                other => Halt::Failed(other.to_string()),
-            }
+            Halt::Failed(error.to_string())
         })
     }
 }
