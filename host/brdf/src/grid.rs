@@ -49,8 +49,8 @@ impl Grid {
 
     /// The grid whose square EXR has this many rows, if there is one.
     pub fn from_directions(n_directions: usize) -> Option<Self> {
-        (1..=30)
-            .filter_map(|deg| Self::with_step_deg(deg as f64).ok())
+        (1000..=30_000)
+            .filter_map(|mdeg| Self::with_step_deg(f64::from(mdeg) / 1000.0).ok())
             .find(|grid| grid.n_directions() == n_directions)
     }
 
@@ -144,6 +144,8 @@ mod tests {
         assert_eq!(grid.n_cells(), 62_726_400);
         assert_eq!(Grid::from_directions(7920), Some(grid));
         assert_eq!(Grid::from_directions(7921), None);
+        let between = Grid::with_step_deg(1.5).unwrap();
+        assert_eq!(Grid::from_directions(between.n_directions()), Some(between));
     }
 
     #[test]

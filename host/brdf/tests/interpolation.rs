@@ -11,7 +11,7 @@ use gonia_brdf::interpolate::{
     Calibration, Coordinates, Origin, Settings, fill, fill_with_errors, select,
 };
 use gonia_brdf::model::{Brdf, Kurt, KurtLobe};
-use gonia_brdf::{Bins, Direction, Grid, Sample};
+use gonia_brdf::{Bins, DenseBrdf, Direction, Grid, Sample};
 
 /// Standard deviation of the samples' noise, relative.
 const NOISE: f64 = 0.02;
@@ -138,6 +138,35 @@ fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
 }
 
 #[test]
+fn a_gap_in_azimuth_is_extrapolated() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let mut samples = measure(&broad());
+    // Neither light nor view between 90 and 180 degrees.
+    samples.retain(|s| {
+        let in_gap = |theta: f32, phi: f32| theta > 5.0 && (90.0..=180.0).contains(&phi);
+        !in_gap(s.theta_i_deg, s.phi_i_deg) && !in_gap(s.theta_v_deg, s.phi_v_deg)
+    });
+    let bins = Bins::new(grid, &samples);
+    let settings = Settings {
+        nodes: 32,
+        tolerance: f32::INFINITY,
+        ..Settings::DEFAULT
+    };
+    let calibration = Calibration::new(&bins, &settings).unwrap();
+    let (_, bars) = fill_with_errors(&bins, &settings, &calibration, &|_| ()).unwrap();
+    let origin = |i: (f64, f64), v: (f64, f64)| {
+        let at = |(theta, phi)| grid.nearest(theta, phi).unwrap();
+        bars.origin[grid.cell(at(i), at(v))]
+    };
+    let extrapolated = Origin::Extrapolated as u8;
+    assert_eq!(origin((60.0, 132.0), (42.0, 0.0)), extrapolated);
+    assert_eq!(origin((42.0, 0.0), (60.0, 132.0)), extrapolated);
+    assert_ne!(origin((60.0, 240.0), (42.0, 0.0)), extrapolated);
+    // Near the pole all azimuths are near.
+    assert_ne!(origin((6.0, 132.0), (42.0, 0.0)), extrapolated);
+}
+
+#[test]
 fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
     let grid = Grid::PAPER;
     let sharp = Kurt::new(
@@ -159,7 +188,7 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
             ..Settings::DEFAULT
         };
         let levels = Levels::new(nodes_of(bins.bins().iter(), settings.coordinates));
-        let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]);
+        let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let around = |d: Vec3| {
             let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
             patches
@@ -194,4 +223,72 @@ fn samples_without_frames_are_held_out_by_clusters() {
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
     assert_eq!(select(&bins, Settings::DEFAULT).trials.len(), 4);
+}
+
+#[test]
+fn blocks_leave_no_seams_whole_or_cut() {
+    let grid = Grid::with_step_deg(4.0).unwrap();
+    let lobe = KurtLobe {
+        specular: [1.0, 0.8, 0.6],
+        f0: 0.05,
+        mx: 0.08,
+        my: 0.3,
+        alpha: 0.3,
+        azimuth_deg: 31.0,
+    };
+    let sharp = Kurt::new([0.2, 0.15, 0.1], &[lobe]);
+    // Blocks of 16° have as many cells as those of 8° on the 2° grid.
+    for (model, tolerance) in [(broad(), f32::INFINITY), (sharp.clone(), 1.0), (sharp, 0.0)] {
+        let bins = Bins::new(grid, &measure(&model));
+        let settings = Settings {
+            block_deg: 16.0,
+            tolerance,
+            noise_variance: (NOISE * NOISE) as f32,
+            ..Settings::DEFAULT
+        };
+        let dense = fill(&bins, &settings, &|_| ()).unwrap();
+        let (across, inside) = bends(&dense, &model, settings.block_deg);
+        println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
+    }
+}
+
+/// RMS of second differences of the error's logarithm between three neighbouring cells, along all
+/// four angles: with a border of two blocks among them, and inside of blocks. Both θ ≤ 75°.
+fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
+    let grid = dense.grid();
+    let (n, n_phi) = (grid.n_directions(), grid.n_phi());
+    let mut block = vec![0; n];
+    for (number, patch) in cover(grid, &[block_deg]).patches.iter().enumerate() {
+        for direction in &patch.directions {
+            block[*direction as usize] = number;
+        }
+    }
+    let off = |light: usize, view: usize| {
+        let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
+        (f64::from(dense.at(light, view)[1]) / model.eval(i, v)[1]).ln()
+    };
+    let interior = |d: usize| grid.direction(d).theta_deg() <= 75.0;
+    // Rows of one row of blocks count as one.
+    let height = (block_deg / grid.step_deg()).round() as usize;
+    let mut rows = vec![[[0.0; 2]; 2]; 2 * grid.n_theta()];
+    for light in (0..n).step_by(7).filter(|d| interior(*d)) {
+        for view in (n_phi..n).filter(|d| interior(*d)) {
+            let around = |k: usize| view / n_phi * n_phi + (view + k) % n_phi;
+            let triples = [[around(1), around(2)], [view + n_phi, view + 2 * n_phi]];
+            for (axis, [b, c]) in triples.into_iter().enumerate() {
+                if c < n && interior(c) {
+                    let bend = off(light, view) - 2.0 * off(light, b) + off(light, c);
+                    let row = axis * grid.n_theta() + view / n_phi / height * height;
+                    let sum = &mut rows[row][usize::from(block[view] == block[c])];
+                    sum[0] += bend * bend;
+                    sum[1] += 1.0;
+                }
+            }
+        }
+    }
+    rows.retain(|row| row.iter().all(|[_, count]| *count > 0.0));
+    let count: f64 = rows.iter().map(|row| row[0][1]).sum();
+    let across: f64 = rows.iter().map(|row| row[0][0]).sum();
+    let inside: f64 = rows.iter().map(|[a, i]| i[0] / i[1] * a[1]).sum();
+    ((across / count).sqrt(), (inside / count).sqrt())
 }
