@@ -18,6 +18,10 @@ const NOISE: f64 = 0.02;
 
 /// Every ninth frame of the paper's plan, points 56 mm apart.
 fn measure(model: &dyn Brdf) -> Vec<Sample> {
+    measure_every(9, model)
+}
+
+fn measure_every(nth: usize, model: &dyn Brdf) -> Vec<Sample> {
     let (lights, views) = (paper_lights(), paper_views());
     let mut state = 1u64;
     let mut uniform = move || {
@@ -25,7 +29,7 @@ fn measure(model: &dyn Brdf) -> Vec<Sample> {
         (state >> 40) as f64 / (1u64 << 24) as f64
     };
     let mut samples = Vec::new();
-    for frame in (0..lights.len() * views.len()).step_by(9) {
+    for frame in (0..lights.len() * views.len()).step_by(nth) {
         let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
         for (x, y) in (-4..=4).flat_map(|x| (-4..=4).map(move |y| (x, y))) {
             let point = [0.056 * f64::from(x), 0.056 * f64::from(y)];
@@ -227,28 +231,22 @@ fn samples_without_frames_are_held_out_by_clusters() {
 
 #[test]
 fn blocks_leave_no_seams_whole_or_cut() {
-    let grid = Grid::with_step_deg(4.0).unwrap();
-    let lobe = KurtLobe {
-        specular: [1.0, 0.8, 0.6],
-        f0: 0.05,
-        mx: 0.08,
-        my: 0.3,
-        alpha: 0.3,
-        azimuth_deg: 31.0,
-    };
-    let sharp = Kurt::new([0.2, 0.15, 0.1], &[lobe]);
-    // Blocks of 16° have as many cells as those of 8° on the 2° grid.
-    for (model, tolerance) in [(broad(), f32::INFINITY), (sharp.clone(), 1.0), (sharp, 0.0)] {
-        let bins = Bins::new(grid, &measure(&model));
+    // Blocks of as many cells as on the 2° grid.
+    let grid = Grid::with_step_deg(3.0).unwrap();
+    for (model, tolerance) in [(broad(), f32::INFINITY), (Kurt::two_thread_fabric(), 1.0)] {
+        let bins = Bins::new(grid, &measure_every(2, &model));
         let settings = Settings {
-            block_deg: 16.0,
+            block_deg: 12.0,
             tolerance,
+            coordinates: Coordinates::SumDifference { weight: 0.5 },
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
         let dense = fill(&bins, &settings, &|_| ()).unwrap();
         let (across, inside) = bends(&dense, &model, settings.block_deg);
         println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
+        // Without blending 1.6 times.
+        assert!(across < 1.3 * inside, "{across} {inside}");
     }
 }
 
@@ -271,7 +269,7 @@ fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
     // Rows of one row of blocks count as one.
     let height = (block_deg / grid.step_deg()).round() as usize;
     let mut rows = vec![[[0.0; 2]; 2]; 2 * grid.n_theta()];
-    for light in (0..n).step_by(7).filter(|d| interior(*d)) {
+    for light in (0..n).step_by(29).filter(|d| interior(*d)) {
         for view in (n_phi..n).filter(|d| interior(*d)) {
             let around = |k: usize| view / n_phi * n_phi + (view + k) % n_phi;
             let triples = [[around(1), around(2)], [view + n_phi, view + 2 * n_phi]];

@@ -7,6 +7,8 @@
 //! is not linear along a border.
 
 use super::patches::{Cover, Patch};
+use crate::bins::median;
+use rayon::prelude::*;
 
 /// Logarithms at the corners of all pairs of patches, and their means over the pairs that meet.
 pub struct Corners {
@@ -19,13 +21,14 @@ pub struct Corners {
     means: Vec<[f32; 3]>,
     /// Number of corners.
     n: usize,
+    /// By how much a corner may shift a pair.
+    limit: f32,
 }
 
 impl Corners {
     /// Averages. `values`: for each patch, what its pairs with itself and all later ones give at
     /// their corners.
-    pub fn new(cover: &Cover, values: Vec<Vec<[f32; 3]>>) -> Self {
-        use rayon::prelude::*;
+    pub fn new(cover: &Cover, values: Vec<Vec<[f32; 3]>>, least_limit: f32) -> Self {
         let mut starts = vec![0];
         for (k, patch) in cover.patches.iter().enumerate() {
             starts.push(starts[k] + patch.corners.len());
@@ -36,6 +39,7 @@ impl Corners {
             values,
             means: Vec::new(),
             n,
+            limit: 0.0,
         };
         let mut patches_at = vec![Vec::new(); n];
         for (number, patch) in cover.patches.iter().enumerate() {
@@ -51,7 +55,29 @@ impl Corners {
                 (v..n).map(move |w| corners.mean_over(&at[v], &at[w]))
             })
             .collect();
+        let mut differences = corners.some_differences(cover);
+        corners.limit = limit_of(&mut differences, least_limit);
         corners
+    }
+
+    /// What some thousand pairs of patches differ from the means by.
+    fn some_differences(&self, cover: &Cover) -> Vec<f32> {
+        let mut differences = Vec::new();
+        let patches = &cover.patches;
+        let step = (patches.len() * patches.len() / 8000).max(1);
+        for number in (0..patches.len() * patches.len()).step_by(step) {
+            let (p, q) = (number / patches.len(), number % patches.len());
+            if p > q {
+                continue;
+            }
+            let mut own = self.of_pair(p, q).iter();
+            for v in &patches[p].corners {
+                for (w, own) in patches[q].corners.iter().zip(&mut own) {
+                    differences.push(difference(*own, self.mean(*v, *w)));
+                }
+            }
+        }
+        differences
     }
 
     /// Mean over all pairs of patches; both orders of light and view count.
@@ -96,7 +122,6 @@ impl Corners {
         cover: &Cover,
         (p, q): (usize, usize),
         logs: &mut [[f32; 3]],
-        limit: f32,
         shifts: &mut Shifts,
     ) {
         let own = self.of_pair(p, q);
@@ -105,11 +130,26 @@ impl Corners {
         for (i, v) in p.corners.iter().enumerate() {
             for (j, w) in q.corners.iter().enumerate() {
                 let own = own[i * q.corners.len() + j];
-                shifts.push(own, self.mean(*v, *w), limit);
+                shifts.push(own, self.mean(*v, *w), self.limit);
             }
         }
         shifts.apply(p, q, logs);
     }
+}
+
+/// How much a corner may shift a block, in medians of the differences around.
+const MEDIANS: f32 = 3.0;
+
+/// By how much a corner may shift a block: a few times what blocks usually differ by, and `least` in any
+/// case. Where neighbours differ by more, the corner lies beyond what one of them knows (a narrow lobe
+/// passes), and the values bend more inside of blocks than they jump between them.
+pub fn limit_of(differences: &mut [f32], least: f32) -> f32 {
+    (MEDIANS * median(differences)).max(least)
+}
+
+/// The largest difference in a channel.
+pub fn difference(own: [f32; 3], mean: [f32; 3]) -> f32 {
+    (0..3).fold(0.0f32, |m, c| m.max((mean[c] - own[c]).abs()))
 }
 
 /// What a thread adds to cells, and room to work in.
@@ -129,7 +169,7 @@ impl Shifts {
     /// The next pair of corners: shifts `own` to `mean`, but by no more than `limit` in any channel.
     pub fn push(&mut self, own: [f32; 3], mean: [f32; 3], limit: f32) {
         let shift = [0, 1, 2].map(|c| mean[c] - own[c]);
-        let largest = shift.iter().fold(0.0f32, |m, s| m.max(s.abs()));
+        let largest = difference(own, mean);
         let share = if largest > limit {
             limit / largest
         } else {

@@ -49,7 +49,7 @@ impl<'a> ByRows<'a> {
     pub fn each_row<E: Send>(
         &self,
         progress: &(dyn Fn(f64) + Sync),
-        take: &(dyn Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
+        take: &(impl Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
     ) -> Result<(), E> {
         let grid = self.fit.grid;
         let (n, n_phi) = (grid.n_directions(), grid.n_phi());
@@ -92,15 +92,9 @@ impl<'a> ByRows<'a> {
             .solve(&self.fit.levels, settings, pair.0, pair.1);
         work.logs.clear();
         work.logs.extend_from_slice(work.refiner.logs());
-        let limit = settings.blend_limit();
         let numbers = (first, second);
-        self.corners.blend(
-            &self.fit.cover,
-            numbers,
-            &mut work.logs,
-            limit,
-            &mut work.shifts,
-        );
+        self.corners
+            .blend(&self.fit.cover, numbers, &mut work.logs, &mut work.shifts);
         let width = pair.1.directions.len();
         for a in 0..patches[p].directions.len() {
             for (b, view) in patches[q].directions.iter().enumerate() {

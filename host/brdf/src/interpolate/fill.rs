@@ -102,8 +102,7 @@ fn solve(
             for q in p..patches.len() {
                 let pair = (&patches[p], &patches[q]);
                 values.load(grid, pair, &mut work.logs);
-                let limit = settings.blend_limit();
-                corners.blend(&fit.cover, (p, q), &mut work.logs, limit, &mut work.shifts);
+                corners.blend(&fit.cover, (p, q), &mut work.logs, &mut work.shifts);
                 for log in &mut work.logs {
                     *log = log.map(bounded_exp);
                 }
@@ -169,7 +168,7 @@ impl<'a> Fit<'a> {
                 at_corners
             })
             .collect();
-        Corners::new(&self.cover, at_corners)
+        Corners::new(&self.cover, at_corners, self.settings.blend_limit())
     }
 }
 

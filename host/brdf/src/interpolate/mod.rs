@@ -76,7 +76,7 @@ impl Preset {
     /// Its settings; [`select`] chooses the coordinates and measures the noise.
     pub const fn settings(self) -> Settings {
         let (block_deg, tolerance, nodes) = match self {
-            Preset::Preview => (16.0, f32::INFINITY, 32),
+            Preset::Preview => (8.0, f32::INFINITY, 32),
             Preset::Fast => (8.0, 2.0, 64),
             Preset::Default => (8.0, 1.0, 128),
             Preset::Best => (8.0, 0.5, 256),
@@ -108,8 +108,7 @@ impl Settings {
         self.tolerance.is_finite()
     }
 
-    /// By how much blending may shift a block, in natural logarithms. Where neighbours differ by more, a
-    /// corner lies beyond what one of them knows, and the values bend more inside than they jump.
+    /// By how much blending may shift a block in any case, in natural logarithms.
     fn blend_limit(&self) -> f32 {
         2.0 * self.noise_variance.sqrt().max(refine::NOISE_MIN)
     }

@@ -7,7 +7,7 @@
 //! these are blended.
 
 use super::Settings;
-use super::blend::Shifts;
+use super::blend::{Shifts, difference, limit_of};
 use super::block::BlockSolver;
 use super::coordinates::Point;
 use super::levels::{Detail, Found, Levels, keep_nearest};
@@ -32,6 +32,8 @@ pub struct Refiner {
     part_corners: Vec<[f32; 3]>,
     /// How many parts a corner of the pair is in.
     parts_at: Vec<u32>,
+    /// What the parts differ from each other by, at their corners.
+    differences: Vec<f32>,
     shifts: Shifts,
     /// Whether variances are wanted too.
     pub with_variances: bool,
@@ -97,12 +99,19 @@ impl Refiner {
         for (sum, count) in self.corners.iter_mut().zip(&self.parts_at) {
             *sum = sum.map(|s| s / (*count).max(1) as f32);
         }
+        self.differences.clear();
+        let places = pairs_of_parts(p, q).flat_map(|(a, b)| corners_in(a, b, q));
+        for (corner, own) in places.zip(&self.part_corners) {
+            self.differences
+                .push(difference(*own, self.corners[corner]));
+        }
+        let limit = limit_of(&mut self.differences, settings.blend_limit());
         let mut first = 0;
         for (a, b) in pairs_of_parts(p, q) {
             self.shifts.clear();
             for corner in corners_in(a, b, q) {
                 let (own, mean) = (self.part_corners[first], self.corners[corner]);
-                self.shifts.push(own, mean, settings.blend_limit());
+                self.shifts.push(own, mean, limit);
                 first += 1;
             }
             self.part.clear();
