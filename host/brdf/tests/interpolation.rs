@@ -130,9 +130,10 @@ fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
     for plane in &bars.standard_error {
         assert!(plane.iter().all(|e| e.is_finite() && *e >= 0.0));
     }
+    // One of the plan's nine views lies at 60°/144°.
     let origin = |i: f64, v: f64| {
-        let at = |theta| grid.nearest(theta, 30.0).unwrap();
-        bars.origin[grid.cell(at(i), at(v))]
+        let at = |theta, phi| grid.nearest(theta, phi).unwrap();
+        bars.origin[grid.cell(at(i, 30.0), at(v, 144.0))]
     };
     assert_eq!(origin(84.0, 84.0), Origin::Extrapolated as u8);
     assert_ne!(origin(84.0, 60.0), Origin::Extrapolated as u8);
