@@ -88,21 +88,10 @@ impl DenseBrdf {
     /// The value at any pair of directions, linear between the nodes in all four angles; beyond
     /// the last elevation the last node's value.
     pub fn lookup(&self, light: Direction, view: Direction) -> [f32; 3] {
-        let light = self.grid.corners(light);
-        let view = self.grid.corners(view);
-        let mut sum = [0.0f64; 3];
-        for (i, wi) in light {
-            for (v, wv) in view {
-                let weight = wi * wv;
-                if weight > 0.0 {
-                    let value = self.at(i, v);
-                    for c in 0..3 {
-                        sum[c] += weight * f64::from(value[c]);
-                    }
-                }
-            }
+        let at = |i, v| Ok::<_, std::convert::Infallible>(self.at(i, v));
+        match self.grid.lookup(light, view, at) {
+            Ok(value) => value,
         }
-        sum.map(|s| s as f32)
     }
 }
 

@@ -49,8 +49,8 @@ impl Grid {
 
     /// The grid whose square EXR has this many rows, if there is one.
     pub fn from_directions(n_directions: usize) -> Option<Self> {
-        (1..=30)
-            .filter_map(|deg| Self::with_step_deg(deg as f64).ok())
+        (1000..=30_000)
+            .filter_map(|mdeg| Self::with_step_deg(f64::from(mdeg) / 1000.0).ok())
             .find(|grid| grid.n_directions() == n_directions)
     }
 
@@ -121,6 +121,30 @@ impl Grid {
         ]
     }
 
+    /// The value at any pair of directions, linear in all four angles between those that `at` gives for
+    /// pairs of direction indices; beyond the last elevation the last node's value.
+    pub fn lookup<E>(
+        &self,
+        light: Direction,
+        view: Direction,
+        mut at: impl FnMut(usize, usize) -> Result<[f32; 3], E>,
+    ) -> Result<[f32; 3], E> {
+        let views = self.corners(view);
+        let mut sum = [0.0f64; 3];
+        for (i, wi) in self.corners(light) {
+            for (v, wv) in views {
+                let weight = wi * wv;
+                if weight > 0.0 {
+                    let value = at(i, v)?;
+                    for c in 0..3 {
+                        sum[c] += weight * f64::from(value[c]);
+                    }
+                }
+            }
+        }
+        Ok(sum.map(|s| s as f32))
+    }
+
     /// The cell of a pair of direction indices: `light·n_directions + view`.
     pub fn cell(&self, light: usize, view: usize) -> usize {
         light * self.n_directions() + view
@@ -144,6 +168,8 @@ mod tests {
         assert_eq!(grid.n_cells(), 62_726_400);
         assert_eq!(Grid::from_directions(7920), Some(grid));
         assert_eq!(Grid::from_directions(7921), None);
+        let between = Grid::with_step_deg(1.5).unwrap();
+        assert_eq!(Grid::from_directions(between.n_directions()), Some(between));
     }
 
     #[test]

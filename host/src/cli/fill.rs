@@ -4,13 +4,13 @@ use super::method::Method;
 use super::progress::Progress;
 use super::provenance::{Provenance, of_this_program};
 use super::table;
-use crate::dataset::dense_exr::write_dense;
+use crate::dataset::dense_exr::{write_dense, write_dense_by_rows};
 use crate::dataset::error_exr::write_error_bars;
 use crate::dataset::samples::read_samples;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::{self, CellSettings};
-use gonia_brdf::interpolate::{self, Calibration, ErrorBars, Origin, Preset, Settings};
+use gonia_brdf::interpolate::{self, ByRows, Calibration, ErrorBars, Origin, Preset, Settings};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::{Path, PathBuf};
 
@@ -38,6 +38,9 @@ pub struct Fill {
     #[arg(long, value_enum, default_value = "relative")]
     scale: ScaleArgument,
 }
+
+/// A grid of more cells than this (12 bytes each) is filled row by row, in twice the time.
+const CELLS_IN_MEMORY: usize = 150_000_000;
 
 /// How to interpolate.
 #[derive(clap::Args, Clone, Copy)]
@@ -187,6 +190,21 @@ impl Fill {
                 );
             }
         }
+        if grid.n_cells() > CELLS_IN_MEMORY {
+            let alone = "it is filled row by row";
+            if self.error.is_some() {
+                bail!(
+                    "--error: not on a grid of {} degrees, {alone}; leave it out",
+                    self.how.step
+                );
+            }
+            if self.method != Method::Default {
+                bail!(
+                    "--method: not on a grid of {} degrees, {alone}; leave it out",
+                    self.how.step
+                );
+            }
+        }
         let mut progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(&self.samples))?;
         if let Method::Cellwise(settings) = self.method {
@@ -194,6 +212,9 @@ impl Fill {
                 bail!("--error: only the default method has error bars; leave out --method");
             }
             return self.fill_cellwise(samples, grid, &settings, &mut progress);
+        }
+        if grid.n_cells() > CELLS_IN_MEMORY {
+            return self.fill_by_rows(samples, grid, base, &mut progress);
         }
         let filled = fill(samples, grid, base, self.error.is_some(), &mut progress)
             .with_context(|| self.samples.display().to_string())?;
@@ -255,6 +276,51 @@ impl Fill {
 }
 
 impl Fill {
+    /// Fills a grid that does not fit memory.
+    fn fill_by_rows(
+        &self,
+        samples: Vec<Sample>,
+        grid: Grid,
+        base: Settings,
+        progress: &mut Progress,
+    ) -> Result<()> {
+        let total = samples.len();
+        let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
+        drop(samples);
+        let settings = progress.stage("choosing settings", |_| {
+            anyhow::Ok(interpolate::select(&bins, base).settings)
+        })?;
+        let rows = progress
+            .stage("fitting", |tell| ByRows::new(&bins, &settings, tell))
+            .with_context(|| self.samples.display().to_string())?;
+        let mut facts = provenance_of(&settings);
+        facts.insert("samples".into(), self.samples.display().to_string());
+        let (outside, filled) = (bins.outside(), bins.bins().len());
+        drop(bins);
+        progress.stage("interpolating and writing", |tell| {
+            write_dense_by_rows(&self.output, grid, &rows, self.scale.into(), &facts, tell)
+        })?;
+        let mut lines = vec![
+            (
+                "samples binned".to_owned(),
+                table::count((total - outside) as u64),
+            ),
+            (
+                "samples outside the grid".into(),
+                table::count(outside as u64),
+            ),
+            ("bins filled".into(), table::count(filled as u64)),
+            ("cells".into(), table::count(grid.n_cells() as u64)),
+            ("settings".into(), settings.to_string()),
+            ("written".into(), self.output.display().to_string()),
+        ];
+        for stage in progress.stages() {
+            lines.push((stage.name.clone(), format!("{:.1} s", stage.seconds)));
+        }
+        table::print(&lines);
+        Ok(())
+    }
+
     /// Fills with one of the methods that the default is compared with.
     fn fill_cellwise(
         &self,

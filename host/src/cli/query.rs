@@ -1,6 +1,6 @@
 //! `gonia query`: values at any directions.
 
-use crate::dataset::dense_exr::read_dense;
+use crate::dataset::dense_exr::DenseLookup;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Direction;
 use std::io::{BufWriter, Write};
@@ -23,7 +23,7 @@ pub struct Query {
 impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let brdf = read_dense(&self.dense)?.brdf;
+        let mut brdf = DenseLookup::open(&self.dense)?;
         let last_deg = (brdf.grid().n_theta() - 1) as f64 * brdf.grid().step_deg();
         let mut input = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
@@ -67,7 +67,7 @@ impl Query {
             let rgb = brdf.lookup(
                 Direction::from_deg(theta_i, phi_i),
                 Direction::from_deg(theta_v, phi_v),
-            );
+            )?;
             writeln!(
                 out,
                 "{theta_i},{phi_i},{theta_v},{phi_v},{},{},{}",

@@ -3,12 +3,14 @@
 
 use super::FileError;
 use super::exr_planes::{self, ExrPlanes, Plane};
-use gonia_brdf::{DenseBrdf, Grid};
+use super::exr_rows::{RowReader, write_rows};
+use gonia_brdf::interpolate::ByRows;
+use gonia_brdf::{DenseBrdf, Direction, Grid};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What gonia's own attributes begin with in the file.
 const PREFIX: &str = "gonia.";
@@ -74,6 +76,90 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
         scale,
         provenance,
     })
+}
+
+/// Writes a dense BRDF whole that does not fit memory, row by row as they are made.
+///
+/// # Errors
+/// As [`write_dense`].
+pub fn write_dense_by_rows(
+    path: &Path,
+    grid: Grid,
+    rows: &ByRows<'_>,
+    scale: Scale,
+    provenance: &BTreeMap<String, String>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(), FileError> {
+    let attributes = attributes_of(scale, provenance);
+    write_rows(path, grid.n_directions(), &attributes, |writer| {
+        rows.each_row(progress, &|light, row| writer.write(light, row))
+    })
+}
+
+/// A dense BRDF of which a few values are wanted: of a plain file only these are read.
+pub enum DenseLookup {
+    /// In memory.
+    Whole(DenseBrdf),
+    /// On the disk.
+    #[doc(hidden)]
+    OnDisk(OnDisk),
+}
+
+/// A plain file, open.
+pub struct OnDisk {
+    grid: Grid,
+    reader: RowReader,
+    path: PathBuf,
+}
+
+impl DenseLookup {
+    /// Opens a file, or reads it.
+    ///
+    /// # Errors
+    /// As [`read_dense`].
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let reader = RowReader::open(path)?;
+        let on_disk = reader.and_then(|reader| {
+            let grid = Grid::from_directions(reader.side())?;
+            let path = path.to_owned();
+            Some(OnDisk { grid, reader, path })
+        });
+        match on_disk {
+            Some(on_disk) => Ok(Self::OnDisk(on_disk)),
+            None => Ok(Self::Whole(read_dense(path)?.brdf)),
+        }
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> Grid {
+        match self {
+            Self::Whole(brdf) => brdf.grid(),
+            Self::OnDisk(file) => file.grid,
+        }
+    }
+
+    /// See [`Grid::lookup`].
+    ///
+    /// # Errors
+    /// When the file cannot be read, or a value is NaN or infinite.
+    pub fn lookup(&mut self, light: Direction, view: Direction) -> Result<[f32; 3], FileError> {
+        match self {
+            Self::Whole(brdf) => Ok(brdf.lookup(light, view)),
+            Self::OnDisk(OnDisk { grid, reader, path }) => {
+                grid.lookup(light, view, |light, view| {
+                    let value = reader
+                        .value(light, view)
+                        .map_err(|error| FileError::reading(path, &error))?;
+                    for (channel, name) in ["R", "G", "B"].iter().enumerate() {
+                        if !value[channel].is_finite() {
+                            return Err(no_value(path, *grid, name, (light, view), value[channel]));
+                        }
+                    }
+                    Ok(value)
+                })
+            }
+        }
+    }
 }
 
 /// The text attributes of a file of gonia's.
@@ -146,22 +232,32 @@ fn check_finite(path: &Path, brdf: &DenseBrdf) -> Result<(), FileError> {
         let bad = plane.par_iter().position_first(|value| !value.is_finite());
         if let Some(cell) = bad {
             let (light, view) = grid.light_and_view(cell);
-            let (i, v) = (grid.direction(light), grid.direction(view));
-            return Err(FileError::new(
-                path,
-                format_args!("{} is no BRDF value", plane[cell]),
-                "fill the missing cells first (gonia fill)",
-            )
-            .at(format_args!(
-                "channel {name}, row {light}, column {view} (light {:.0}°/{:.0}°, view {:.0}°/{:.0}°)",
-                i.theta_deg(),
-                i.phi_deg(),
-                v.theta_deg(),
-                v.phi_deg()
-            )));
+            return Err(no_value(path, grid, name, (light, view), plane[cell]));
         }
     }
     Ok(())
+}
+
+fn no_value(
+    path: &Path,
+    grid: Grid,
+    channel: &str,
+    (light, view): (usize, usize),
+    value: f32,
+) -> FileError {
+    let (i, v) = (grid.direction(light), grid.direction(view));
+    FileError::new(
+        path,
+        format_args!("{value} is no BRDF value"),
+        "fill the missing cells first (gonia fill)",
+    )
+    .at(format_args!(
+        "channel {channel}, row {light}, column {view} (light {:.0}°/{:.0}°, view {:.0}°/{:.0}°)",
+        i.theta_deg(),
+        i.phi_deg(),
+        v.theta_deg(),
+        v.phi_deg()
+    ))
 }
 
 #[cfg(test)]
@@ -223,6 +319,37 @@ mod tests {
             "{error}"
         );
         assert_eq!(error.lines().count(), 1);
+    }
+
+    #[test]
+    fn a_lookup_reads_only_what_it_needs_and_names_what_is_wrong_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("dense.exr");
+        let mut planes = dense().into_planes();
+        let grid = Grid::with_step_deg(30.0).unwrap();
+        planes[2][grid.cell(25, 14)] = f32::NAN;
+        let brdf = DenseBrdf::new(grid, planes).unwrap();
+        let file = DenseFile {
+            brdf: brdf.clone(),
+            scale: Scale::Relative,
+            provenance: BTreeMap::new(),
+        };
+        write_dense(&path, file).unwrap();
+        let mut lookup = DenseLookup::open(&path).unwrap();
+        assert_eq!(lookup.grid(), grid);
+        let at = Direction::from_deg;
+        for (light, view) in [
+            (at(0.0, 0.0), at(30.0, 0.0)),
+            (at(41.0, 250.0), at(17.0, 355.0)),
+        ] {
+            let looked_up = lookup.lookup(light, view).unwrap();
+            assert_eq!(looked_up, brdf.lookup(light, view));
+        }
+        let error = lookup.lookup(at(60.0, 30.0), at(30.0, 60.0)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            read_dense(&path).unwrap_err().to_string()
+        );
     }
 
     #[test]

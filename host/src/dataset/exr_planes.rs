@@ -179,23 +179,7 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
     } = image;
     let [r, g, b] = planes.map(FlatSamples::from);
     let extra = extra.map(|(name, plane)| (name, FlatSamples::from(plane)));
-    let mut layer_attributes = LayerAttributes {
-        software_name: Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION"))),
-        ..LayerAttributes::default()
-    };
-    for (name, value) in &attributes {
-        let texts = Text::new_or_none(name).zip(Text::new_or_none(latin(value)));
-        let Some((name, value)) = texts else {
-            return Err(FileError::new(
-                path,
-                format_args!("\"{name}\" cannot be the name of an attribute"),
-                "name it with 1 to 255 Latin letters",
-            ));
-        };
-        layer_attributes
-            .other
-            .insert(name, AttributeValue::Text(value));
-    }
+    let layer_attributes = layer_attributes(path, &attributes)?;
     let encoding = Encoding {
         compression: Compression::Uncompressed,
         ..Encoding::UNCOMPRESSED
@@ -223,6 +207,29 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
             })
     })?;
     take_planes(path, image.layer_data.channel_data)
+}
+
+/// The attributes of a file, the program's name among them.
+pub(super) fn layer_attributes(
+    path: &Path,
+    attributes: &BTreeMap<String, String>,
+) -> Result<LayerAttributes, FileError> {
+    let mut layer = LayerAttributes {
+        software_name: Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION"))),
+        ..LayerAttributes::default()
+    };
+    for (name, value) in attributes {
+        let texts = Text::new_or_none(name).zip(Text::new_or_none(latin(value)));
+        let Some((name, value)) = texts else {
+            return Err(FileError::new(
+                path,
+                format_args!("\"{name}\" cannot be the name of an attribute"),
+                "name it with 1 to 255 Latin letters",
+            ));
+        };
+        layer.other.insert(name, AttributeValue::Text(value));
+    }
+    Ok(layer)
 }
 
 /// The planes R, G and B out of an image, without copying them.

@@ -12,6 +12,7 @@ pub mod dense_exr;
 pub mod error;
 pub mod error_exr;
 mod exr_planes;
+mod exr_rows;
 pub mod fit_toml;
 pub mod frame;
 pub mod frame_exr;

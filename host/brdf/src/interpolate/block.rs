@@ -44,6 +44,8 @@ pub struct BlockSolver {
     /// `K⁻¹ (y − μ)`, channel by channel.
     weights: [Vec<f32>; 3],
     mean: [f32; 3],
+    /// Values stay between these, channel by channel.
+    limits: [(f32, f32); 3],
     /// Variance of the process, channel by channel, by maximum likelihood.
     signal: [f32; 3],
     /// Nodes in the factor.
@@ -74,6 +76,7 @@ impl BlockSolver {
         self.middle = middle;
         self.scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
         self.load(nodes, padded);
+        self.limits = [0, 1, 2].map(|c| limits_of(&self.log_values[c][..n]));
         if n >= 2 {
             let mut nugget = None;
             // A pivot lost to rounding is mended by a larger nugget; the last of these makes any
@@ -116,7 +119,8 @@ impl BlockSolver {
         });
     }
 
-    /// Evaluates the fitted process at places; appends the logarithm per channel.
+    /// Evaluates the fitted process at places; appends the logarithm per channel, which stays near the
+    /// nodes' range: beyond them the process is no more than a guess, and must not run away.
     pub fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; 3]>) {
         self.arch.dispatch(Evaluate {
             solver: self,
@@ -159,6 +163,22 @@ impl BlockSolver {
             self.signal[c] = squares.sum::<f32>() / n.max(1) as f32;
         }
     }
+}
+
+/// A value may lie beyond those around by this share of their range, as a peak between them does …
+const BEYOND_SHARE: f32 = 0.5;
+/// … and by this in any case, but never by more than that, in natural logarithms.
+const BEYOND: (f32, f32) = (0.1, 1.0);
+
+fn limits_of(values: &[f32]) -> (f32, f32) {
+    let low = values.iter().copied().fold(f32::INFINITY, f32::min);
+    let high = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    if low > high {
+        // Of no nodes.
+        return (f32::NEG_INFINITY, f32::INFINITY);
+    }
+    let beyond = (BEYOND_SHARE * (high - low)).clamp(BEYOND.0, BEYOND.1);
+    (low - beyond, high + beyond)
 }
 
 struct Fit<'a> {
@@ -360,6 +380,8 @@ impl WithSimd for Evaluate<'_> {
             let mut result = s.mean;
             for c in 0..3 {
                 result[c] += simd.reduce_sum_f32s(sums[c]);
+                let (low, high) = s.limits[c];
+                result[c] = result[c].max(low).min(high);
             }
             self.out.push(result);
         }
@@ -760,6 +782,26 @@ mod tests {
         assert!((value[0] - same[0].log_value[0]).abs() < 1e-3, "{value:?}");
         solver.fit(same[..0].iter(), [0.0; 6], 0.0, &SETTINGS);
         assert!(at(&solver, &[1.0; 6]).iter().all(|v| v.is_finite()));
+    }
+
+    #[test]
+    fn far_from_its_nodes_a_block_does_not_run_away() {
+        // A slope of 2 over nodes a tenth apart; the place is thirty radii away.
+        let nodes: Vec<Node> = (0..20)
+            .map(|k| {
+                let mut node = node(0.1 * k as f32, 0.0, 1.0);
+                node.log_value = [0.2 * k as f32; 3];
+                node
+            })
+            .collect();
+        let mut solver = BlockSolver::default();
+        solver.fit(nodes.iter(), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0, &SETTINGS);
+        let between = at(&solver, &node(1.05, 0.0, 1.0).point)[0];
+        assert!((between - 2.1).abs() < 0.05, "{between}");
+        for x in [-4.0, 6.0, 30.0] {
+            let far = at(&solver, &node(x, 0.0, 1.0).point)[0];
+            assert!((-1.0..=4.8).contains(&far), "{x}: {far}");
+        }
     }
 
     #[test]

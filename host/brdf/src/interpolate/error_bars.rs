@@ -9,8 +9,9 @@ use super::Settings;
 use super::hold_out::{HoldOut, Prediction};
 use super::nodes::SIGMA_PER_MAD;
 use crate::bins::{Bin, Bins};
-use crate::direction::Vec3;
+use crate::direction::{Vec3, dot};
 use crate::grid::Grid;
+use rayon::prelude::*;
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 pub const Z95: f32 = 1.96;
@@ -39,7 +40,8 @@ pub enum Origin {
     Reciprocal = 1,
     /// Between measured directions.
     Interpolated = 2,
-    /// Beyond all measured pairs of elevations: a guess, however small its error seems.
+    /// Beyond all measured pairs of elevations, or in a gap of the directions: a guess, however small
+    /// its error seems.
     Extrapolated = 3,
 }
 
@@ -217,38 +219,67 @@ fn mean(log: [f32; 3]) -> f32 {
     log.iter().sum::<f32>() / 3.0
 }
 
-/// Which pairs of elevations are beyond all measured ones: for each elevation of one direction, the
-/// highest of the other.
+/// Which cells are beyond all that was measured: beyond the pairs of elevations (for each elevation of
+/// one direction, the highest of the other), or in a gap of the directions.
 pub(super) struct Reach {
     n_phi: usize,
     /// By row of the grid: one more than the highest row measured with this row or a higher one.
     rows: Vec<usize>,
+    /// By direction: whether one near it was measured as light, and as view.
+    near: [Vec<bool>; 2],
 }
+
+/// A direction farther than this from all measured ones lies in a gap: the paper's plan has steps of
+/// 15°, and each frame spans some degrees.
+const GAP_DEG: f64 = 15.0;
 
 impl Reach {
     pub(super) fn new(bins: &Bins) -> Self {
         let grid = bins.grid();
         let n_phi = grid.n_phi();
         let mut rows = vec![0; grid.n_theta()];
+        let mut measured = [(); 2].map(|()| vec![false; grid.n_directions()]);
         for bin in bins.bins() {
             let (light, view) = grid.light_and_view(bin.cell as usize);
             let (i, v) = (light / n_phi, view / n_phi);
             rows[i] = rows[i].max(v + 1);
             rows[v] = rows[v].max(i + 1);
+            measured[0][light] = true;
+            measured[1][view] = true;
         }
         for row in (1..rows.len()).rev() {
             rows[row - 1] = rows[row - 1].max(rows[row]);
         }
-        Self { n_phi, rows }
+        let near = measured.map(|measured| near(grid, &measured));
+        Self { n_phi, rows, near }
     }
 
     pub(super) fn origin(&self, light: usize, view: usize) -> Origin {
-        if view / self.n_phi < self.rows[light / self.n_phi] {
+        let [lights, views] = &self.near;
+        let no_gap = lights[light] && views[view] || lights[view] && views[light];
+        if no_gap && view / self.n_phi < self.rows[light / self.n_phi] {
             Origin::Interpolated
         } else {
             Origin::Extrapolated
         }
     }
+}
+
+/// The directions within a gap's width of a measured one.
+fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
+    let vector = |d: usize| grid.direction(d).to_vec3();
+    let known: Vec<Vec3> = (0..measured.len())
+        .filter(|d| measured[*d])
+        .map(vector)
+        .collect();
+    let closest = GAP_DEG.to_radians().cos();
+    (0..measured.len())
+        .into_par_iter()
+        .map(|d| {
+            let here = vector(d);
+            measured[d] || known.iter().any(|k| dot(*k, here) >= closest)
+        })
+        .collect()
 }
 
 /// Writes the cells with samples, and their mirrors, over what the blocks gave.

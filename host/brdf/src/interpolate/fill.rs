@@ -1,10 +1,11 @@
 //! All cells, block by block.
 
 use super::Settings;
+use super::blend::{Corners, Shifts};
 use super::error_bars::{Calibration, ErrorBars, Reach, write_measured};
 use super::levels::Levels;
 use super::nodes::nodes_of;
-use super::patches::{Patch, cover};
+use super::patches::{Cover, Patch, cover};
 use super::refine::Refiner;
 use crate::bins::Bins;
 use crate::dense::DenseBrdf;
@@ -70,41 +71,113 @@ fn solve(
     calibration: Option<&Calibration>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(Planes, Planes), FillError> {
-    if bins.bins().len() < MIN_BINS {
-        return Err(FillError::TooFewBins(bins.bins().len()));
-    }
-    let grid = bins.grid();
-    let levels = Levels::new(nodes_of(bins.bins().iter(), settings.coordinates));
-    let patches = cover(grid, &settings.patch_sizes_deg());
+    let fit = Fit::new(bins, settings)?;
+    let (grid, patches) = (fit.grid, &fit.cover.patches);
     let values = SharedPlanes::new(grid.n_cells());
     let errors = SharedPlanes::new(calibration.map_or(0, |_| grid.n_cells()));
-    let pairs = patches.len() * (patches.len() + 1) / 2;
-    let done = AtomicUsize::new(0);
+    // First the logarithms of the cells of each pair, and their relative errors.
+    let corners = fit.solve_pairs(calibration.is_some(), progress, &|refiner, p, q| {
+        let logs = refiner.logs();
+        values.store(grid, (p, q), logs);
+        if let Some(calibration) = calibration {
+            let variances = refiner.variances();
+            let directions = p
+                .vectors
+                .iter()
+                .flat_map(|light| q.vectors.iter().map(move |view| (*light, *view)));
+            let relative: Vec<[f32; 3]> = directions
+                .zip(logs.iter().zip(variances))
+                .map(|((light, view), (log, variance))| {
+                    calibration.standard_error(light, view, *log, *variance)
+                })
+                .collect();
+            errors.store(grid, (p, q), &relative);
+        }
+    });
+    // Then, with what the neighbours say, the values.
     (0..patches.len())
         .into_par_iter()
-        // Early patches have the most partners; hand them out one by one.
         .with_max_len(1)
-        .for_each_init(Refiner::default, |refiner, p| {
-            refiner.with_variances = calibration.is_some();
+        .for_each_init(Blended::default, |work, p| {
             for q in p..patches.len() {
-                let (p, q) = (&patches[p], &patches[q]);
-                refiner.solve(&levels, settings, p, q);
-                let logs = refiner.logs();
-                values.store(grid, p, q, |k| logs[k].map(bounded_exp));
-                if let Some(calibration) = calibration {
-                    let variances = refiner.variances();
-                    errors.store(grid, p, q, |k| {
-                        let (light, view) = (k / q.vectors.len(), k % q.vectors.len());
-                        let (light, view) = (p.vectors[light], q.vectors[view]);
-                        let error = calibration.standard_error(light, view, logs[k], variances[k]);
-                        [0, 1, 2].map(|c| error[c] * bounded_exp(logs[k][c]))
-                    });
+                let pair = (&patches[p], &patches[q]);
+                values.load(grid, pair, &mut work.logs);
+                corners.blend(&fit.cover, (p, q), &mut work.logs, &mut work.shifts);
+                for log in &mut work.logs {
+                    *log = log.map(bounded_exp);
+                }
+                values.store_both(grid, pair, &work.logs);
+                if calibration.is_some() {
+                    errors.load(grid, pair, &mut work.errors);
+                    for (error, value) in work.errors.iter_mut().zip(&work.logs) {
+                        *error = [0, 1, 2].map(|c| error[c] * value[c]);
+                    }
+                    errors.store_both(grid, pair, &work.errors);
                 }
             }
-            let before = done.fetch_add(patches.len() - p, Relaxed);
-            progress((before + patches.len() - p) as f64 / pairs as f64);
         });
     Ok((values.into_planes(grid), errors.into_planes(grid)))
+}
+
+/// What a fill is made of.
+pub(super) struct Fit<'a> {
+    pub grid: Grid,
+    pub settings: &'a Settings,
+    pub levels: Levels,
+    pub cover: Cover,
+}
+
+impl<'a> Fit<'a> {
+    pub(super) fn new(bins: &Bins, settings: &'a Settings) -> Result<Self, FillError> {
+        if bins.bins().len() < MIN_BINS {
+            return Err(FillError::TooFewBins(bins.bins().len()));
+        }
+        let grid = bins.grid();
+        Ok(Self {
+            grid,
+            settings,
+            levels: Levels::new(nodes_of(bins.bins().iter(), settings.coordinates)),
+            cover: cover(grid, &settings.patch_sizes_deg()),
+        })
+    }
+
+    /// Solves all pairs of patches, shows each to `each`, and averages at their corners.
+    pub(super) fn solve_pairs(
+        &self,
+        with_variances: bool,
+        progress: &(dyn Fn(f64) + Sync),
+        each: &(dyn Fn(&Refiner, &Patch, &Patch) + Sync),
+    ) -> Corners {
+        let patches = &self.cover.patches;
+        let pairs = patches.len() * (patches.len() + 1) / 2;
+        let done = AtomicUsize::new(0);
+        let at_corners = (0..patches.len())
+            .into_par_iter()
+            // Early patches have the most partners; hand them out one by one.
+            .with_max_len(1)
+            .map_init(Refiner::default, |refiner, p| {
+                refiner.with_variances = with_variances;
+                let mut at_corners = Vec::new();
+                for q in &patches[p..] {
+                    refiner.solve(&self.levels, self.settings, &patches[p], q);
+                    at_corners.extend_from_slice(refiner.corners());
+                    each(refiner, &patches[p], q);
+                }
+                let before = done.fetch_add(patches.len() - p, Relaxed);
+                progress((before + patches.len() - p) as f64 / pairs as f64);
+                at_corners
+            })
+            .collect();
+        Corners::new(&self.cover, at_corners, self.settings.blend_limit())
+    }
+}
+
+/// Working memory of one thread.
+#[derive(Default)]
+struct Blended {
+    logs: Vec<[f32; 3]>,
+    errors: Vec<[f32; 3]>,
+    shifts: Shifts,
 }
 
 /// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
@@ -116,16 +189,32 @@ impl SharedPlanes {
         Self([(); 3].map(|()| (0..length).map(|_| AtomicU32::new(0)).collect()))
     }
 
-    /// Stores the cells of a pair, numbered light by light, and their mirror images.
-    fn store(&self, grid: Grid, p: &Patch, q: &Patch, value: impl Fn(usize) -> [f32; 3]) {
+    /// Stores the cells of a pair, light by light.
+    fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
+        for (cell, value) in cells_of(grid, p, q).zip(cells) {
+            for c in 0..3 {
+                self.0[c][cell].store(value[c].to_bits(), Relaxed);
+            }
+        }
+    }
+
+    /// What [`Self::store`] stored.
+    fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; 3]>) {
+        let at = |cell: usize| [0, 1, 2].map(|c| f32::from_bits(self.0[c][cell].load(Relaxed)));
+        cells.clear();
+        cells.extend(cells_of(grid, p, q).map(at));
+    }
+
+    /// Stores the cells of a pair and their mirror images.
+    fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
         let same = std::ptr::eq(p, q);
+        let mut cells = cells.iter();
         for (a, light) in p.directions.iter().enumerate() {
-            for (b, view) in q.directions.iter().enumerate() {
+            for ((b, view), value) in q.directions.iter().enumerate().zip(&mut cells) {
                 // Within one patch both orders of a pair are there; the first serves for both.
                 if same && b < a {
                     continue;
                 }
-                let value = value(a * q.directions.len() + b);
                 let (light, view) = (*light as usize, *view as usize);
                 let (cell, mirror) = (grid.cell(light, view), grid.cell(view, light));
                 for c in 0..3 {
@@ -150,8 +239,16 @@ impl SharedPlanes {
     }
 }
 
+fn cells_of<'a>(grid: Grid, p: &'a Patch, q: &'a Patch) -> impl Iterator<Item = usize> + use<'a> {
+    p.directions.iter().flat_map(move |light| {
+        q.directions
+            .iter()
+            .map(move |view| grid.cell(*light as usize, *view as usize))
+    })
+}
+
 /// e^±60 are far beyond any BRDF and far within single precision.
-fn bounded_exp(log: f32) -> f32 {
+pub(super) fn bounded_exp(log: f32) -> f32 {
     log.clamp(-60.0, 60.0).exp()
 }
 

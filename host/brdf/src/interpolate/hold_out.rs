@@ -111,7 +111,7 @@ impl<'a> HoldOut<'a> {
                 .moved(|node| node.point_of(self.training[node.bin()], settings.coordinates))
         });
         let levels = moved.as_ref().unwrap_or(&self.levels);
-        let patches = cover(self.grid, &settings.patch_sizes_deg());
+        let patches = cover(self.grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(self.grid, &patches);
         self.tests
             .par_iter()

@@ -6,7 +6,9 @@
 //! values are logarithms at the mean measured directions, each bin counts at its reciprocal place
 //! too, and only half of the pairs are solved, so the result is positive and exactly reciprocal.
 
+pub mod blend;
 pub mod block;
+pub mod by_rows;
 pub mod cholesky;
 pub mod coordinates;
 pub mod error_bars;
@@ -18,6 +20,7 @@ pub mod patches;
 pub mod refine;
 pub mod select;
 
+pub use by_rows::ByRows;
 pub use coordinates::Coordinates;
 pub use error_bars::{Calibration, ErrorBars, Origin};
 pub use fill::{FillError, fill, fill_with_errors};
@@ -73,7 +76,7 @@ impl Preset {
     /// Its settings; [`select`] chooses the coordinates and measures the noise.
     pub const fn settings(self) -> Settings {
         let (block_deg, tolerance, nodes) = match self {
-            Preset::Preview => (16.0, f32::INFINITY, 32),
+            Preset::Preview => (8.0, f32::INFINITY, 32),
             Preset::Fast => (8.0, 2.0, 64),
             Preset::Default => (8.0, 1.0, 128),
             Preset::Best => (8.0, 0.5, 256),
@@ -94,13 +97,20 @@ impl Settings {
     /// What suits most materials; [`select`] finds what suits one.
     pub const DEFAULT: Settings = Preset::Default.settings();
 
-    /// Sizes of the patches, coarse to fine, degrees.
-    fn patch_sizes_deg(&self) -> Vec<f64> {
-        if self.tolerance.is_finite() {
-            vec![self.block_deg, 0.5 * self.block_deg]
-        } else {
-            vec![self.block_deg]
-        }
+    /// Sizes of the patches, coarse to fine, degrees. Where none are cut, the corners of the fine ones
+    /// still serve to blend the coarse.
+    fn patch_sizes_deg(&self) -> [f64; 2] {
+        [self.block_deg, 0.5 * self.block_deg]
+    }
+
+    /// Whether pairs of patches may be cut.
+    fn cuts(&self) -> bool {
+        self.tolerance.is_finite()
+    }
+
+    /// By how much blending may shift a block in any case, in natural logarithms.
+    fn blend_limit(&self) -> f32 {
+        2.0 * self.noise_variance.sqrt().max(refine::NOISE_MIN)
     }
 
     fn block(&self) -> block::BlockSettings {

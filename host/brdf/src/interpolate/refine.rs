@@ -3,9 +3,11 @@
 //!
 //! The coarse block goes through merged nodes. Where its values change most, one fine block is
 //! fitted through the bins' own nodes; if the two agree on that block's cells within what the
-//! samples' noise explains, the coarse one stands. Else every part gets a block of its own.
+//! samples' noise explains, the coarse one stands. Else every part gets a block of its own, and
+//! these are blended.
 
 use super::Settings;
+use super::blend::{Shifts, difference, limit_of};
 use super::block::BlockSolver;
 use super::coordinates::Point;
 use super::levels::{Detail, Found, Levels, keep_nearest};
@@ -22,8 +24,17 @@ pub struct Refiner {
     places: Vec<Point>,
     /// Logarithms of the pair's cells, light by light.
     logs: Vec<[f32; 3]>,
-    /// The same of one part.
+    /// The same at the pair's corners, corner by corner of the first patch.
+    corners: Vec<[f32; 3]>,
+    /// Logarithms of the cells of one part.
     part: Vec<[f32; 3]>,
+    /// The corners of all parts, one part after the other.
+    part_corners: Vec<[f32; 3]>,
+    /// How many parts a corner of the pair is in.
+    parts_at: Vec<u32>,
+    /// What the parts differ from each other by, at their corners.
+    differences: Vec<f32>,
+    shifts: Shifts,
     /// Whether variances are wanted too.
     pub with_variances: bool,
     /// Variances of the logarithms, where wanted.
@@ -56,19 +67,59 @@ impl Count {
 impl Refiner {
     /// Interpolates the cells of a pair: see [`Self::logs`] and [`Self::variances`].
     pub fn solve(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
-        if !self.solve_whole(levels, settings, p, q) {
-            return;
+        if self.solve_whole(levels, settings, p, q) {
+            self.solve_parts(levels, settings, p, q);
         }
+    }
+
+    /// All parts of a pair, each in a block of its own, and no seams between them.
+    fn solve_parts(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
         let mut logs = std::mem::take(&mut self.logs);
-        for a in &p.children {
-            for b in &q.children {
-                self.solve_part(levels, settings, a, b);
-                for (k, place) in places_in(a, b, q).enumerate() {
-                    logs[place] = self.part[k];
-                    if self.with_variances {
-                        self.variances[place] = self.part_variances[k];
-                    }
+        self.part_corners.clear();
+        self.parts_at.clear();
+        self.parts_at.resize(self.corners.len(), 0);
+        self.corners.fill([0.0; 3]);
+        for (a, b) in pairs_of_parts(p, q) {
+            self.solve_part(levels, settings, a, b);
+            for (k, place) in places_in(a, b, q).enumerate() {
+                logs[place] = self.part[k];
+                if self.with_variances {
+                    self.variances[place] = self.part_variances[k];
                 }
+            }
+            let first = self.part_corners.len();
+            self.evaluate_corners(settings, &a.patch, &b.patch);
+            for (k, corner) in corners_in(a, b, q).enumerate() {
+                self.parts_at[corner] += 1;
+                for c in 0..3 {
+                    self.corners[corner][c] += self.part_corners[first + k][c];
+                }
+            }
+        }
+        for (sum, count) in self.corners.iter_mut().zip(&self.parts_at) {
+            *sum = sum.map(|s| s / (*count).max(1) as f32);
+        }
+        self.differences.clear();
+        let places = pairs_of_parts(p, q).flat_map(|(a, b)| corners_in(a, b, q));
+        for (corner, own) in places.zip(&self.part_corners) {
+            self.differences
+                .push(difference(*own, self.corners[corner]));
+        }
+        let limit = limit_of(&mut self.differences, settings.blend_limit());
+        let mut first = 0;
+        for (a, b) in pairs_of_parts(p, q) {
+            self.shifts.clear();
+            for corner in corners_in(a, b, q) {
+                let (own, mean) = (self.part_corners[first], self.corners[corner]);
+                self.shifts.push(own, mean, limit);
+                first += 1;
+            }
+            self.part.clear();
+            self.part
+                .extend(places_in(a, b, q).map(|place| logs[place]));
+            self.shifts.apply(&a.patch, &b.patch, &mut self.part);
+            for (k, place) in places_in(a, b, q).enumerate() {
+                logs[place] = self.part[k];
             }
         }
         self.logs = logs;
@@ -84,8 +135,11 @@ impl Refiner {
             self.variances.clear();
             self.solver.variances_at(&self.places, &mut self.variances);
         }
+        self.part_corners.clear();
+        self.evaluate_corners(settings, p, q);
+        std::mem::swap(&mut self.corners, &mut self.part_corners);
         let mut cut = false;
-        if let Some((a, b)) = steepest(&logs, p, q) {
+        if let Some((a, b)) = steepest(&logs, p, q).filter(|_| settings.cuts()) {
             self.solve_part(levels, settings, a, b);
             let limit = settings.tolerance * settings.noise_variance.sqrt().max(NOISE_MIN);
             cut = self.rms_from(&logs, q, a, b) > limit;
@@ -98,6 +152,11 @@ impl Refiner {
     /// Natural logarithms of the cells of the last pair, light by light.
     pub fn logs(&self) -> &[[f32; 3]] {
         &self.logs
+    }
+
+    /// The same at the pair's corners, corner by corner of the first patch.
+    pub fn corners(&self) -> &[[f32; 3]] {
+        &self.corners
     }
 
     /// Variances of these logarithms, not calibrated; none unless [`Self::with_variances`] is set.
@@ -115,7 +174,7 @@ impl Refiner {
         (light, view): (Vec3, Vec3),
     ) -> ([f32; 3], [f32; 3]) {
         // Only where a pair may be cut must its cells be known.
-        let cut = !p.children.is_empty() && self.solve_whole(levels, settings, p, q);
+        let cut = settings.cuts() && self.solve_whole(levels, settings, p, q);
         let nearest = |patch: &'_ Patch, direction: Vec3| {
             let along = |c: &Child| dot(c.patch.centre, direction);
             let parts = 0..patch.children.len();
@@ -176,6 +235,17 @@ impl Refiner {
         self.solver.evaluate(&self.places, logs);
     }
 
+    /// Appends what the block gives at the corners of a pair.
+    fn evaluate_corners(&mut self, settings: &Settings, p: &Patch, q: &Patch) {
+        self.places.clear();
+        for light in &p.corner_vectors {
+            for view in &q.corner_vectors {
+                self.places.push(settings.coordinates.point(*light, *view));
+            }
+        }
+        self.solver.evaluate(&self.places, &mut self.part_corners);
+    }
+
     /// A pair of parts in a fine block.
     fn solve_part(&mut self, levels: &Levels, settings: &Settings, a: &Child, b: &Child) {
         self.fit_part(levels, settings, a.patch.centre, b.patch.centre);
@@ -202,7 +272,7 @@ impl Refiner {
 }
 
 /// Two fits through different nodes never agree better than this, whatever the samples' noise.
-const NOISE_MIN: f32 = 0.003;
+pub(super) const NOISE_MIN: f32 = 0.003;
 
 /// Where the cells of a pair of parts stand among those of the whole.
 fn places_in(a: &Child, b: &Child, q: &Patch) -> impl Iterator<Item = usize> {
@@ -212,6 +282,25 @@ fn places_in(a: &Child, b: &Child, q: &Patch) -> impl Iterator<Item = usize> {
             .iter()
             .map(move |j| *i as usize * width + *j as usize)
     })
+}
+
+/// Where the corners of a pair of parts stand among those of the whole.
+fn corners_in(a: &Child, b: &Child, q: &Patch) -> impl Iterator<Item = usize> {
+    let width = q.corners.len();
+    a.corner_places.iter().flat_map(move |i| {
+        b.corner_places
+            .iter()
+            .map(move |j| *i as usize * width + *j as usize)
+    })
+}
+
+fn pairs_of_parts<'a>(
+    p: &'a Patch,
+    q: &'a Patch,
+) -> impl Iterator<Item = (&'a Child, &'a Child)> + use<'a> {
+    p.children
+        .iter()
+        .flat_map(|a| q.children.iter().map(move |b| (a, b)))
 }
 
 /// The pair of parts over which the values change most; `None` where there are no parts.

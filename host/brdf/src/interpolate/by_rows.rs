@@ -1,0 +1,167 @@
+//! A fill row by row, for grids whose cells do not fit memory (1°: a thousand million, 12 GB).
+//!
+//! Every pair of patches is solved three times: once for what it says at its corners, and then for the
+//! rows of either patch. The same numbers in the same order give the same bits, so that the result is as
+//! reciprocal as one in memory.
+
+use super::Settings;
+use super::blend::{Corners, Shifts};
+use super::fill::{FillError, Fit, bounded_exp};
+use super::refine::Refiner;
+use crate::bins::Bins;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// A fill of which the rows are still to be made.
+pub struct ByRows<'a> {
+    fit: Fit<'a>,
+    corners: Corners,
+}
+
+/// Working memory of one thread.
+#[derive(Default)]
+struct Work {
+    refiner: Refiner,
+    logs: Vec<[f32; 3]>,
+    shifts: Shifts,
+}
+
+impl<'a> ByRows<'a> {
+    /// Solves all pairs of patches once. `progress` is told the share done, from any thread.
+    ///
+    /// # Errors
+    /// Too few bins.
+    pub fn new(
+        bins: &Bins,
+        settings: &'a Settings,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Self, FillError> {
+        let fit = Fit::new(bins, settings)?;
+        let corners = fit.solve_pairs(false, progress, &|_, _, _| ());
+        Ok(Self { fit, corners })
+    }
+
+    /// Makes all rows, and gives each (its number, and three channels of a value a view) to `take`, in
+    /// no order and from several threads. A thread holds the rows of one patch.
+    ///
+    /// # Errors
+    /// The first of `take`'s.
+    pub fn each_row<E: Send>(
+        &self,
+        progress: &(dyn Fn(f64) + Sync),
+        take: &(impl Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
+    ) -> Result<(), E> {
+        let grid = self.fit.grid;
+        let (n, n_phi) = (grid.n_directions(), grid.n_phi());
+        let patches = &self.fit.cover.patches;
+        let done = AtomicUsize::new(0);
+        (0..patches.len())
+            .into_par_iter()
+            .with_max_len(1)
+            .try_for_each_init(Work::default, |work, p| {
+                let lights = &patches[p].directions;
+                let mut rows = [(); 3].map(|()| vec![0.0f32; lights.len() * n]);
+                for q in 0..patches.len() {
+                    self.write_pair(work, p, q, &mut rows);
+                }
+                for (k, light) in lights.iter().enumerate() {
+                    let mut row = rows.each_mut().map(|plane| &mut plane[k * n..(k + 1) * n]);
+                    // The pole's value, computed at azimuth 0, is that of all azimuths.
+                    for plane in &mut row {
+                        let pole = plane[0];
+                        plane[1..n_phi].fill(pole);
+                    }
+                    let row = row.map(|plane| &*plane);
+                    let copies = if *light == 0 { n_phi } else { 1 };
+                    for azimuth in 0..copies {
+                        take(*light as usize + azimuth, row)?;
+                    }
+                }
+                progress((done.fetch_add(1, Relaxed) + 1) as f64 / patches.len() as f64);
+                Ok(())
+            })
+    }
+
+    /// Writes the cells of lights in patch `p` and views in patch `q`.
+    fn write_pair(&self, work: &mut Work, p: usize, q: usize, rows: &mut [Vec<f32>; 3]) {
+        let patches = &self.fit.cover.patches;
+        let (settings, n) = (self.fit.settings, self.fit.grid.n_directions());
+        let (first, second) = (p.min(q), p.max(q));
+        let pair = (&patches[first], &patches[second]);
+        work.refiner
+            .solve(&self.fit.levels, settings, pair.0, pair.1);
+        work.logs.clear();
+        work.logs.extend_from_slice(work.refiner.logs());
+        let numbers = (first, second);
+        self.corners
+            .blend(&self.fit.cover, numbers, &mut work.logs, &mut work.shifts);
+        let width = pair.1.directions.len();
+        for a in 0..patches[p].directions.len() {
+            for (b, view) in patches[q].directions.iter().enumerate() {
+                // Within one patch the first order of a pair serves for both, as in memory.
+                let swap = q < p || (p == q && b < a);
+                let place = if swap { b * width + a } else { a * width + b };
+                for c in 0..3 {
+                    rows[c][a * n + *view as usize] = bounded_exp(work.logs[place][c]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fill;
+    use super::*;
+    use crate::grid::Grid;
+    use crate::model::{Brdf, Kurt};
+    use crate::sample::Sample;
+    use std::sync::Mutex;
+
+    #[test]
+    fn rows_are_those_of_a_fill_in_memory_to_the_bit() {
+        let model = Kurt::two_thread_fabric();
+        let grid = Grid::with_step_deg(6.0).unwrap();
+        let samples: Vec<Sample> = (0..40_000)
+            .map(|k| {
+                let at = |a: f64, to: f64| ((k as f64 * a) % 1.0 * to) as f32;
+                let (i, v) = (
+                    [at(0.819_173, 84.0), at(0.671_044, 360.0)],
+                    [at(0.549_700, 84.0), at(0.450_300, 360.0)],
+                );
+                let vector = |d: [f32; 2]| {
+                    crate::direction::Direction::from_deg(d[0].into(), d[1].into()).to_vec3()
+                };
+                Sample {
+                    theta_i_deg: i[0],
+                    phi_i_deg: i[1],
+                    theta_v_deg: v[0],
+                    phi_v_deg: v[1],
+                    rgb: model.eval(vector(i), vector(v)).map(|v| v as f32),
+                    frame: k,
+                }
+            })
+            .collect();
+        let bins = Bins::new(grid, &samples);
+        // Tight enough that some pairs are cut.
+        let settings = Settings {
+            block_deg: 24.0,
+            nodes: 32,
+            ..Settings::DEFAULT
+        };
+        let dense = fill(&bins, &settings, &|_| ()).unwrap();
+        let n = grid.n_directions();
+        let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
+        ByRows::new(&bins, &settings, &|_| ())
+            .unwrap()
+            .each_row(&|_| (), &|light, row| {
+                let mut planes = planes.lock().map_err(|_| ())?;
+                for c in 0..3 {
+                    planes[c][light * n..(light + 1) * n].copy_from_slice(row[c]);
+                }
+                Ok::<(), ()>(())
+            })
+            .unwrap();
+        assert_eq!(dense.planes(), &planes.into_inner().unwrap());
+    }
+}
