@@ -194,7 +194,7 @@ mod tests {
             let swing =
                 |rise| settle(&step_times_us(15.0, 60, rise), plant_that_swings(hz, 0.08)).1;
             let [sharp, round] = [swing(0), swing(100)];
-            let share = if hz == 10.0 { 0.1 } else { 0.7 };
+            let share = if hz == 10.0 { 0.2 } else { 0.7 };
             assert!(round < share * sharp, "{hz} Hz: {round} {sharp}");
         }
     }
