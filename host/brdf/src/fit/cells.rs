@@ -7,7 +7,7 @@ use crate::direction::Vec3;
 /// Both elevations beyond this: nothing can be measured there, and nothing is fitted.
 const VOID_DEG: f64 = 78.0;
 /// Candidates a cell that is chosen for its brightness.
-const CANDIDATES: usize = 8;
+const CANDIDATES: usize = 64;
 
 /// A value to fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
