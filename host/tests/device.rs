@@ -115,7 +115,10 @@ fn a_person_at_the_bench_homes_moves_sets_and_calibrates_an_arm() {
         "6",
     ];
     let fitted = ok(&stands, readings);
-    assert!(row(&fitted, "encoder, RMS after").ends_with("deg"), "{fitted}");
+    assert!(
+        row(&fitted, "encoder, RMS after").ends_with("deg"),
+        "{fitted}"
+    );
     assert_eq!(row(&ok(&["identify"], ""), "theta encoder"), "calibrated");
     let few = [
         "calibrate",
