@@ -37,14 +37,14 @@ pub fn test() -> Result<()> {
     table.step("boards", || build_boards(&root))?;
     table.step("size of the boards", || check_sizes(&root))?;
     table.step("tests", || run(cargo(&root).args(["test", "--workspace"])))?;
+    // Here and below with the whole workspace's features, as all has been built for the tests above.
     table.step("sessions that are killed", || {
         run(cargo(&root)
-            .args(["test", "-p", "gonia", "--test", "capture"])
+            .args(["test", "--workspace", "--test", "capture"])
             .args(["--", "--ignored", "--nocapture", "--test-threads", "1"]))
     })?;
     if qemu {
         table.step("firmware in QEMU", || {
-            // With the whole workspace's features, as they have been built for the tests above.
             run(cargo(&root)
                 .args(["test", "--workspace", "--test", "controllers_qemu"])
                 .args(["--", "--ignored", "--nocapture"])
@@ -59,7 +59,7 @@ pub fn test() -> Result<()> {
     if install("chromium", "chromium") {
         table.step("the report in a browser", || {
             run(cargo(&root)
-                .args(["test", "-p", "gonia", "--test", "browser"])
+                .args(["test", "--workspace", "--test", "browser"])
                 .args(["--", "--ignored"])
                 .env("GONIA_BROWSER", "chromium"))
         })?;
