@@ -107,7 +107,6 @@ impl<T: Transport> Transport for Bent<T> {
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()> {
         let mut bytes = bytes.to_vec();
         self.bend(&mut bytes, ONE_IN_THERE);
-        eprintln!("{} > {:02x?}", self.wire.now_us() % 1000000000, bytes);
         self.wire.send(&bytes)
     }
 
@@ -115,13 +114,6 @@ impl<T: Transport> Transport for Bent<T> {
         let before = out.len();
         self.wire.receive(out, timeout_us)?;
         self.bend(&mut out[before..], ONE_IN_BACK);
-        if out.len() > before {
-            eprintln!(
-                "{} < {:02x?}",
-                self.wire.now_us() % 1000000000,
-                &out[before..]
-            );
-        }
         Ok(())
     }
 

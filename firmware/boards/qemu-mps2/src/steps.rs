@@ -56,6 +56,8 @@ pub struct HalfTimer {
     next_ticks: u32,
     /// The time that a timer would have which keeps time, 1/256 µs.
     ideal_ticks: u64,
+    /// When the last period with a step or a turn has ended, 1/256 µs.
+    ended_ticks: u64,
     up: bool,
 }
 
@@ -73,7 +75,9 @@ pub fn queue(axis: Axis, period: Period) {
         if !channel.progress().is_playing {
             let now_ticks = now_us() * TICKS_PER_US;
             let timer = channel.timer();
-            timer.ideal_ticks = timer.ideal_ticks.max(now_ticks.saturating_sub(LATE_TICKS));
+            if now_ticks.saturating_sub(timer.ended_ticks) > LATE_TICKS {
+                timer.ideal_ticks = now_ticks;
+            }
         }
         // The firmware has asked whether there is room.
         let _ = channel.push(period);
@@ -116,6 +120,7 @@ fn on_period_of(axis: Axis, channel: &mut StepChannel<HalfTimer>) {
         return;
     }
     channel.timer().ideal_ticks = ended_ticks;
+    channel.timer().ended_ticks = now_us() * TICKS_PER_US;
     if end == End::Step {
         let up = channel.timer().up;
         let at_us = ended_ticks / TICKS_PER_US;
@@ -135,6 +140,7 @@ impl HalfTimer {
             running_ticks: REST_TICKS,
             next_ticks: REST_TICKS,
             ideal_ticks: 0,
+            ended_ticks: 0,
             up: true,
         }
     }
