@@ -75,6 +75,10 @@ pub fn local_direction(arm: Direction, distance_m: f64, point_m: [f64; 2]) -> Ve
 
 /// An angle in degrees wrapped into [0, 360).
 pub fn wrap_deg(deg: f64) -> f64 {
+    // The usual case, without a division.
+    if (0.0..360.0).contains(&deg) {
+        return deg;
+    }
     let wrapped = deg.rem_euclid(360.0);
     // rem_euclid of a tiny negative number rounds to 360 itself.
     if wrapped >= 360.0 { 0.0 } else { wrapped }

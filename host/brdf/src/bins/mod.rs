@@ -1,0 +1,343 @@
+//! Binning: samples that share a cell become one value, their median (paper, Section III).
+
+mod node;
+
+use crate::grid::Grid;
+use crate::sample::Sample;
+use node::{Node, Nodes};
+use rayon::prelude::*;
+
+/// A filled cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bin {
+    /// The cell, see [`Grid::cell`].
+    pub cell: u32,
+    /// Number of samples.
+    pub count: u32,
+    /// Their frame when all came from the same one, else [`Sample::NO_FRAME`].
+    pub frame: u32,
+    /// Median per channel.
+    pub median: [f32; 3],
+    /// Median absolute deviation from the median, per channel; 0 for a single sample.
+    pub mad: [f32; 3],
+    /// Mean of the light directions, a unit vector. The samples sit off the node, and a value
+    /// belongs to where it was measured.
+    pub light: [f32; 3],
+    /// Mean of the view directions, a unit vector.
+    pub view: [f32; 3],
+}
+
+/// All filled cells of a grid, in ascending order of the cell.
+#[derive(Clone, Debug)]
+pub struct Bins {
+    grid: Grid,
+    bins: Vec<Bin>,
+    outside: usize,
+}
+
+impl Bins {
+    /// Bins samples to their nearest nodes. Samples beyond the grid's last elevation, and samples
+    /// with a value or an angle that is not finite, are counted as outside.
+    pub fn new(grid: Grid, samples: &[Sample]) -> Self {
+        // Sorting ten million cells at once goes through memory many times. Sorted by their light
+        // first, each light's thousand samples fit the nearest cache.
+        let size = samples.len().div_ceil(4 * rayon::current_num_threads());
+        let shares: Vec<ByLight> = samples
+            .par_chunks(size.max(1))
+            .enumerate()
+            .map(|(k, share)| ByLight::new(grid, share, k * size))
+            .collect();
+        let nodes = Nodes::new(grid);
+        let lights: Vec<usize> = (0..grid.n_directions()).collect();
+        let bins = lights
+            .par_chunks(LIGHTS_AT_A_TIME)
+            .map(|lights| {
+                let mut scratch = Vec::new();
+                let mut keys: Vec<u64> = Vec::new();
+                let mut sorted: Vec<Sample> = Vec::new();
+                let mut bins = Vec::new();
+                for &light in lights {
+                    keys.clear();
+                    for share in &shares {
+                        keys.extend_from_slice(share.of(light));
+                    }
+                    // By view, then by number: the result does not depend on the threads.
+                    keys.sort_unstable();
+                    // One copy of them all waits for memory once, not once a bin.
+                    sorted.clear();
+                    sorted.extend(keys.iter().map(|key| samples[number_of(*key)]));
+                    let mut rest = &sorted[..];
+                    for same in keys.chunk_by(|a, b| view_of(*a) == view_of(*b)) {
+                        let (group, others) = rest.split_at(same.len());
+                        rest = others;
+                        let nodes = (nodes.at(light), nodes.at(view_of(same[0])));
+                        let cell = grid.cell(light, view_of(same[0]));
+                        bins.push(summarize(cell, nodes, group, &mut scratch));
+                    }
+                }
+                bins
+            })
+            .collect::<Vec<_>>()
+            .concat();
+        Self {
+            grid,
+            bins,
+            outside: shares.iter().map(|share| share.outside).sum(),
+        }
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The filled cells.
+    pub fn bins(&self) -> &[Bin] {
+        &self.bins
+    }
+
+    /// How many samples fell outside the grid.
+    pub fn outside(&self) -> usize {
+        self.outside
+    }
+}
+
+/// A view's node and a sample's number in one word, so that one sort of words groups samples by view
+/// and keeps their order within it.
+fn key_of(view: u32, number: usize) -> u64 {
+    (u64::from(view) << 32) | number as u64
+}
+
+fn view_of(key: u64) -> usize {
+    (key >> 32) as usize
+}
+
+fn number_of(key: u64) -> usize {
+    (key & 0xffff_ffff) as usize
+}
+
+/// Light directions that one task sorts and summarizes.
+const LIGHTS_AT_A_TIME: usize = 32;
+
+/// Some of the samples, put in order of their light's node.
+struct ByLight {
+    /// See [`key_of`].
+    keys: Vec<u64>,
+    /// Where the keys of each light begin; one more than there are lights.
+    starts: Vec<u32>,
+    outside: usize,
+}
+
+impl ByLight {
+    /// `first` is the number of the first sample.
+    fn new(grid: Grid, samples: &[Sample], first: usize) -> Self {
+        let cells: Vec<Option<(u32, u32)>> = samples.iter().map(|s| nodes_of(grid, s)).collect();
+        let mut starts = vec![0u32; grid.n_directions() + 1];
+        for (light, _) in cells.iter().flatten() {
+            starts[*light as usize + 1] += 1;
+        }
+        for light in 0..grid.n_directions() {
+            starts[light + 1] += starts[light];
+        }
+        let inside = starts[grid.n_directions()] as usize;
+        let mut keys = vec![0u64; inside];
+        let mut next = starts.clone();
+        for (number, cell) in cells.iter().enumerate() {
+            if let Some((light, view)) = cell {
+                let at = &mut next[*light as usize];
+                keys[*at as usize] = key_of(*view, first + number);
+                *at += 1;
+            }
+        }
+        Self {
+            keys,
+            starts,
+            outside: samples.len() - inside,
+        }
+    }
+
+    fn of(&self, light: usize) -> &[u64] {
+        &self.keys[self.starts[light] as usize..self.starts[light + 1] as usize]
+    }
+}
+
+/// The nodes of light and view of a sample within the grid.
+fn nodes_of(grid: Grid, s: &Sample) -> Option<(u32, u32)> {
+    if !s.rgb.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let light = grid.nearest(s.theta_i_deg.into(), s.phi_i_deg.into())?;
+    let view = grid.nearest(s.theta_v_deg.into(), s.phi_v_deg.into())?;
+    Some((light as u32, view as u32))
+}
+
+fn summarize(
+    cell: usize,
+    (light, view): (Node, Node),
+    group: &[Sample],
+    scratch: &mut Vec<f32>,
+) -> Bin {
+    let mut frame = group[0].frame;
+    if group.iter().any(|s| s.frame != frame) {
+        frame = Sample::NO_FRAME;
+    }
+    let mut value = [0.0; 3];
+    let mut mad = [0.0; 3];
+    for c in 0..3 {
+        scratch.clear();
+        scratch.extend(group.iter().map(|s| s.rgb[c]));
+        value[c] = median(scratch);
+        let centre = value[c];
+        scratch.iter_mut().for_each(|v| *v = (*v - centre).abs());
+        mad[c] = median(scratch);
+    }
+    Bin {
+        cell: cell as u32,
+        count: group.len() as u32,
+        frame,
+        median: value,
+        mad,
+        light: light.mean(group.iter().map(|s| (s.theta_i_deg, s.phi_i_deg))),
+        view: view.mean(group.iter().map(|s| (s.theta_v_deg, s.phi_v_deg))),
+    }
+}
+
+/// The median of finite values, which are reordered; of an even number the mean of the middle two.
+/// 0 of none.
+pub fn median(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    if n == 0 {
+        return 0.0;
+    }
+    // Most bins hold a few samples.
+    if n <= 12 {
+        for k in 1..n {
+            let mut at = k;
+            while at > 0 && values[at - 1] > values[at] {
+                values.swap(at - 1, at);
+                at -= 1;
+            }
+        }
+        let middle = values[n / 2];
+        return if n % 2 == 1 {
+            middle
+        } else {
+            0.5 * (values[n / 2 - 1] + middle)
+        };
+    }
+    let (below, middle, _) = values.select_nth_unstable_by(n / 2, f32::total_cmp);
+    let middle = *middle;
+    if n % 2 == 1 {
+        middle
+    } else {
+        let lower = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        0.5 * (lower + middle)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direction::Direction;
+
+    fn sample(theta_i: f32, phi_i: f32, value: f32, frame: u32) -> Sample {
+        Sample {
+            theta_i_deg: theta_i,
+            phi_i_deg: phi_i,
+            theta_v_deg: 30.0,
+            phi_v_deg: 90.0,
+            rgb: [value, 2.0 * value, 3.0 * value],
+            frame,
+        }
+    }
+
+    #[test]
+    fn a_bin_holds_median_spread_count_and_mean_direction() {
+        let bins = Bins::new(
+            Grid::PAPER,
+            &[
+                sample(40.5, 359.5, 1.0, 3),
+                sample(40.5, 0.5, 9.0, 3),
+                sample(39.5, 0.0, 2.0, 3),
+                sample(88.0, 0.0, 1.0, 3),
+                sample(40.0, 0.0, f32::NAN, 3),
+            ],
+        );
+        assert_eq!(bins.outside(), 2);
+        assert_eq!(bins.bins().len(), 1);
+        let bin = bins.bins()[0];
+        let grid = Grid::PAPER;
+        assert_eq!(bin.cell as usize, grid.cell(20 * 180, 15 * 180 + 45));
+        assert_eq!((bin.count, bin.frame), (3, 3));
+        assert_eq!(bin.median, [2.0, 4.0, 6.0]);
+        assert_eq!(bin.mad, [1.0, 2.0, 3.0]);
+        let mean = Direction::from_vec3(bin.light.map(f64::from));
+        assert!((mean.theta_deg() - 40.17).abs() < 0.01, "{mean:?}");
+        assert!(mean.phi_deg() < 1e-3 || mean.phi_deg() > 359.999);
+    }
+
+    #[test]
+    fn a_bin_of_two_frames_names_neither() {
+        let bins = Bins::new(
+            Grid::PAPER,
+            &[sample(40.0, 0.0, 1.0, 1), sample(40.0, 0.0, 1.0, 2)],
+        );
+        assert_eq!(bins.bins()[0].frame, Sample::NO_FRAME);
+    }
+
+    #[test]
+    fn bins_come_in_order_whatever_the_pieces() {
+        let samples: Vec<Sample> = (0..5000)
+            .map(|k| sample((k * 7 % 86) as f32, (k * 13 % 360) as f32, k as f32, k))
+            .collect();
+        let bins = Bins::new(Grid::PAPER, &samples);
+        assert!(bins.bins().windows(2).all(|w| w[0].cell < w[1].cell));
+        let total: u32 = bins.bins().iter().map(|b| b.count).sum();
+        assert_eq!(total, 5000);
+    }
+
+    #[test]
+    fn mean_directions_are_those_of_the_vectors() {
+        for step in [1.0, 2.0, 30.0] {
+            let grid = Grid::with_step_deg(step).unwrap();
+            for k in 0..3000u16 {
+                let mut s = sample(f32::from(k % 73) + 0.37, f32::from(k % 359) + 0.91, 1.0, 0);
+                s.theta_v_deg = f32::from(k % 73) * 0.01;
+                s.phi_v_deg = f32::from(k % 36) * 10.0 + 0.02;
+                let bin = Bins::new(grid, &[s]).bins()[0];
+                let angle = |got: [f32; 3], theta: f32, phi: f32| {
+                    let wanted = Direction::from_deg(theta.into(), phi.into()).to_vec3();
+                    crate::direction::angle_between(got.map(f64::from), wanted).to_degrees()
+                };
+                assert!(angle(bin.light, s.theta_i_deg, s.phi_i_deg) < 1e-5);
+                assert!(angle(bin.view, s.theta_v_deg, s.phi_v_deg) < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn azimuths_of_another_turn_and_angles_that_are_none() {
+        let mut turned = sample(40.0, 350.5, 1.0, 0);
+        turned.phi_i_deg -= 720.0;
+        let mut none = turned;
+        none.phi_v_deg = f32::NAN;
+        let bins = Bins::new(Grid::PAPER, &[turned, none]);
+        assert_eq!((bins.bins().len(), bins.outside()), (1, 1));
+        let light = Direction::from_vec3(bins.bins()[0].light.map(f64::from));
+        assert!((light.phi_deg() - 350.5).abs() < 1e-4, "{light:?}");
+    }
+
+    #[test]
+    fn medians_of_even_odd_and_none() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert_eq!(median(&mut []), 0.0);
+        for n in 1..40u16 {
+            let mut values: Vec<f32> = (0..n).map(|k| f32::from(k * 79 % 64)).collect();
+            let mut sorted = values.clone();
+            sorted.sort_by(f32::total_cmp);
+            let (low, high) = (sorted[usize::from((n - 1) / 2)], sorted[usize::from(n / 2)]);
+            assert_eq!(median(&mut values), 0.5 * (low + high), "{n}");
+        }
+    }
+}
