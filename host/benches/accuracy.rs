@@ -16,10 +16,10 @@ use gonia_sim::scene::{Noise, Scene, SceneGeometry, Surface, true_brdf};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-mod accuracy_svg;
 mod clock;
-use accuracy_svg::{Heat, Line, draw};
+mod drawing;
 use clock::{mean, median_ms};
+use drawing::{Heat, Line, draw};
 
 const THETA_I: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
 const THETA_V: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];

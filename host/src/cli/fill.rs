@@ -6,7 +6,7 @@ use super::provenance::{Provenance, of_this_program};
 use super::table;
 use crate::dataset::dense_exr::{write_dense, write_dense_by_rows};
 use crate::dataset::error_exr::write_error_bars;
-use crate::dataset::samples::read_samples;
+use crate::dataset::samples::read_samples_of_all;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::{self, CellSettings};
@@ -20,8 +20,9 @@ use std::path::{Path, PathBuf};
     after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame."
 )]
 pub struct Fill {
-    /// Samples, .npy or .csv
-    samples: PathBuf,
+    /// Samples, .npy or .csv; several files of one material count together
+    #[arg(required = true)]
+    samples: Vec<PathBuf>,
     /// The dense BRDF to write (OpenEXR)
     #[arg(short, long, value_name = "DENSE.exr")]
     output: PathBuf,
@@ -177,6 +178,16 @@ pub fn fill(
 }
 
 impl Fill {
+    /// The files of samples, for people.
+    fn names(&self) -> String {
+        let names: Vec<String> = self
+            .samples
+            .iter()
+            .map(|p| p.display().to_string())
+            .collect();
+        names.join(" ")
+    }
+
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let (grid, base) = self.how.check()?;
@@ -206,7 +217,7 @@ impl Fill {
             }
         }
         let mut progress = Progress::new();
-        let samples = progress.stage("reading samples", |_| read_samples(&self.samples))?;
+        let samples = progress.stage("reading samples", |_| read_samples_of_all(&self.samples))?;
         if let Method::Cellwise(settings) = self.method {
             if self.error.is_some() {
                 bail!("--error: only the default method has error bars; leave out --method");
@@ -217,14 +228,14 @@ impl Fill {
             return self.fill_by_rows(samples, grid, base, &mut progress);
         }
         let filled = fill(samples, grid, base, self.error.is_some(), &mut progress)
-            .with_context(|| self.samples.display().to_string())?;
+            .with_context(|| self.names())?;
         let scale = self.scale.into();
         let file = DenseFile {
             brdf: filled.dense,
             scale,
             provenance: {
                 let mut facts = provenance_of(&filled.settings);
-                facts.insert("samples".into(), self.samples.display().to_string());
+                facts.insert("samples".into(), self.names());
                 facts
             },
         };
@@ -292,9 +303,9 @@ impl Fill {
         })?;
         let rows = progress
             .stage("fitting", |tell| ByRows::new(&bins, &settings, tell))
-            .with_context(|| self.samples.display().to_string())?;
+            .with_context(|| self.names())?;
         let mut facts = provenance_of(&settings);
-        facts.insert("samples".into(), self.samples.display().to_string());
+        facts.insert("samples".into(), self.names());
         let (outside, filled) = (bins.outside(), bins.bins().len());
         drop(bins);
         progress.stage("interpolating and writing", |tell| {
@@ -335,10 +346,10 @@ impl Fill {
             .stage("interpolating", |tell| {
                 cellwise::fill(&bins, settings, tell)
             })
-            .with_context(|| self.samples.display().to_string())?;
+            .with_context(|| self.names())?;
         let mut provenance = of_this_program();
         provenance.insert("interpolation".into(), settings.to_string());
-        provenance.insert("samples".into(), self.samples.display().to_string());
+        provenance.insert("samples".into(), self.names());
         let file = DenseFile {
             brdf: filled.dense,
             scale: self.scale.into(),

@@ -13,6 +13,7 @@ mod import;
 mod method;
 mod photo;
 mod plan;
+mod plan_adaptive;
 mod process;
 mod progress;
 mod provenance;

@@ -1,5 +1,6 @@
 //! `gonia plan`: what a session will do, without doing it.
 
+use super::plan_adaptive::{expectation, propose};
 use super::table;
 use crate::capture::keep_out::{Pair, apart_deg, way};
 use crate::capture::{SETTLE_TIME_S, move_time_s, nearest_turn_deg};
@@ -18,13 +19,13 @@ const BYTES_A_PIXEL: u64 = 6;
 /// Bytes of a sample in a file: eight floats.
 const BYTES_A_SAMPLE: u64 = 32;
 
-/// Rows that compare the plan with other orders of the same poses.
-const OF_ALL_POSES: [&str; 2] = ["travelling as listed", "no order is faster than"];
+/// Most poses that are proposed at once: ordering them takes the square of their number.
+const ADD_MAX: usize = 5000;
 
 /// Orders the poses, checks them against the arms' limits, and estimates time and disk.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n\nWithout rings it is the paper's plan: 105 lights x 81 views."
+    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n\nWithout rings it is the paper's plan: 105 lights x 81 views."
 )]
 pub struct Plan {
     /// The rig
@@ -38,6 +39,13 @@ pub struct Plan {
     /// Rings of light directions
     #[arg(long, value_name = "RINGS")]
     lights: Option<RingList>,
+    /// Samples measured so far (several files count together): propose the poses that lower the
+    /// error of `gonia fill` most
+    #[arg(long, value_name = "SAMPLES", num_args = 1.., conflicts_with_all = ["views", "lights"])]
+    adaptive: Vec<PathBuf>,
+    /// How many poses to propose
+    #[arg(long, value_name = "N", default_value_t = 500, requires = "adaptive")]
+    add: usize,
     /// Seconds a pose for exposures and read-out
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     dwell: f64,
@@ -57,25 +65,31 @@ impl Plan {
         if !(0.0..180.0).contains(&self.keep_out) {
             bail!("--keep-out {}: must lie in 0..180 degrees", self.keep_out);
         }
-        let mut rings = Rings::paper();
-        if let Some(RingList(views)) = self.views {
-            rings.views = views;
+        if !(1..=ADD_MAX).contains(&self.add) {
+            bail!("--add {}: must lie in 1..={ADD_MAX} poses", self.add);
         }
-        if let Some(RingList(lights)) = self.lights {
-            rings.lights = lights;
-        }
-        check_limits(&rings)?;
         if let Some(path) = &self.output {
             check_writable(super::fill::folder_of(path))?;
         }
-        let mut plan = travelling(&rings);
+        let (mut plan, proposed) = if self.adaptive.is_empty() {
+            let mut rings = Rings::paper();
+            if let Some(RingList(views)) = self.views {
+                rings.views = views;
+            }
+            if let Some(RingList(lights)) = self.lights {
+                rings.lights = lights;
+            }
+            check_limits(&rings)?;
+            (travelling(&rings), Vec::new())
+        } else {
+            let proposal = propose(&rig, &self.adaptive, self.add, self.keep_out)?;
+            let plan = plan::order(&proposal.poses, &arm_time_s, &arm_time_s);
+            (plan, vec![expectation(proposal.error)])
+        };
         let apart = (self.keep_out > 0.0).then(|| keep_apart(&mut plan, self.keep_out));
         let mut rows = estimate(&rig, &plan, self.dwell);
-        if let Some(apart) = apart {
-            // Of all the poses, and so no longer to be compared.
-            rows.retain(|(name, _)| !OF_ALL_POSES.contains(&name.as_str()));
-            rows.extend(apart);
-        }
+        rows.extend(proposed);
+        rows.extend(apart.unwrap_or_default());
         if let Some(path) = &self.output {
             write_plan_csv(path, &plan.poses)?;
             rows.push(("written".into(), path.display().to_string()));
@@ -127,6 +141,8 @@ fn keep_apart(plan: &mut plan::Plan, keep_out_deg: f64) -> Vec<(String, String)>
         true
     });
     plan.travel_s = travel_s;
+    // They are of all the poses.
+    plan.others = None;
     let count = |n: u64| table::count(n);
     vec![
         (
@@ -179,22 +195,17 @@ fn estimate(rig: &Rig, plan: &plan::Plan, dwell_s: f64) -> Vec<(String, String)>
     let mut rows = vec![
         ("poses".to_owned(), table::count(poses)),
         ("travelling".into(), table::duration(plan.travel_s)),
-        (
-            OF_ALL_POSES[0].into(),
-            format!(
-                "{} ({:.2} x)",
-                table::duration(plan.listed_travel_s),
-                ratio(plan.listed_travel_s, plan.travel_s)
-            ),
-        ),
-        (
-            OF_ALL_POSES[1].into(),
-            format!(
-                "{} ({:.2} x)",
-                table::duration(plan.bound_s),
-                ratio(plan.bound_s, plan.travel_s)
-            ),
-        ),
+    ];
+    if let Some(others) = plan.others {
+        let row = |name: &str, time_s: f64| {
+            let ratio = ratio(time_s, plan.travel_s);
+            let text = format!("{} ({ratio:.2} x)", table::duration(time_s));
+            (name.to_owned(), text)
+        };
+        rows.push(row("travelling as listed", others.listed_s));
+        rows.push(row("no order is faster than", others.bound_s));
+    }
+    rows.extend([
         (
             "session".into(),
             format!(
@@ -209,15 +220,15 @@ fn estimate(rig: &Rig, plan: &plan::Plan, dwell_s: f64) -> Vec<(String, String)>
                 table::bytes(poses * pixels * BYTES_A_PIXEL)
             ),
         ),
-    ];
-    rows.push((
-        "samples".into(),
-        format!(
-            "at most {}, {}",
-            table::count(samples),
-            table::bytes(samples * BYTES_A_SAMPLE)
+        (
+            "samples".into(),
+            format!(
+                "at most {}, {}",
+                table::count(samples),
+                table::bytes(samples * BYTES_A_SAMPLE)
+            ),
         ),
-    ));
+    ]);
     rows
 }
 

@@ -6,7 +6,7 @@
 
 use super::{FileError, samples_csv, samples_npy};
 use gonia_brdf::{Sample, direction::wrap_deg};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The names of the columns; the last one is optional.
 pub const COLUMNS: [&str; 8] = [
@@ -27,6 +27,42 @@ pub fn read_samples(path: &Path) -> Result<Vec<Sample>, FileError> {
         Format::Npy => samples_npy::read(path),
         Format::Csv => samples_csv::read(path),
     }
+}
+
+/// Reads the samples of several sessions of one material as one: frames are numbered on, so that no
+/// two sessions share a number.
+///
+/// # Errors
+/// As [`read_samples`], and more frames than a file can number.
+pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<Vec<Sample>, FileError> {
+    let mut all: Vec<Sample> = Vec::new();
+    let mut next = 0u32;
+    for path in paths {
+        let mut samples = read_samples(path)?;
+        let mut last = None;
+        for sample in &mut samples {
+            if sample.frame != Sample::NO_FRAME {
+                sample.frame = sample.frame.saturating_add(next);
+                last = last.max(Some(sample.frame));
+            }
+        }
+        if let Some(last) = last {
+            if last as f32 > LAST_FRAME {
+                return Err(FileError::new(
+                    path,
+                    format_args!("brings the frames to number {last}"),
+                    "number the frames of each file from 0",
+                ));
+            }
+            next = last + 1;
+        }
+        if all.is_empty() {
+            all = samples;
+        } else {
+            all.append(&mut samples);
+        }
+    }
+    Ok(all)
 }
 
 /// Writes samples whole, by the extension of the file; with frame numbers unless all are unknown.
@@ -189,6 +225,21 @@ pub(super) mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.ends_with("name it .npy or .csv"), "{error}");
+    }
+
+    #[test]
+    fn frames_of_several_files_are_numbered_on() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.npy", "b.csv"].map(|name| dir.path().join(name));
+        write_samples(&a, &some_samples(2500)).unwrap();
+        write_samples(&b, &some_samples(1300)).unwrap();
+        let all = read_samples_of_all(&[a.clone(), b]).unwrap();
+        assert_eq!(all.len(), 3800);
+        assert_eq!(
+            (all[2499].frame, all[2500].frame, all[3799].frame),
+            (2, 3, 4)
+        );
+        assert_eq!(all[..2500], read_samples(&a).unwrap());
     }
 
     #[test]

@@ -14,16 +14,28 @@ const GAIN: f64 = 1e-9;
 /// The path will be travelled forwards and backwards, so a step counts the mean of both ways; 2-opt
 /// needs that symmetry too, or it might never end.
 pub fn shortest_path(directions: &[Direction], time: MoveTime) -> Vec<usize> {
-    let n = directions.len();
-    let both_ways = |a: usize, b: usize| {
-        0.5 * (time(directions[a], directions[b]) + time(directions[b], directions[a]))
-    };
-    let times: Vec<Vec<f64>> = (0..n)
-        .map(|a| (0..n).map(|b| both_ways(a, b)).collect())
-        .collect();
+    let times = both_ways(directions, &|a, b| time(*a, *b));
     let mut path = nearest_neighbours(&times);
     while reverse_a_stretch(&mut path, &times) || move_a_stretch(&mut path, &times) {}
     path
+}
+
+/// An order of thousands of places, starting at the first one: 2-opt only, since moving stretches
+/// takes time with the cube of their number.
+pub fn long_path<T>(places: &[T], time: &dyn Fn(&T, &T) -> f64) -> Vec<usize> {
+    let times = both_ways(places, time);
+    let mut path = nearest_neighbours(&times);
+    while reverse_a_stretch(&mut path, &times) {}
+    path
+}
+
+/// The mean of both ways between any two places.
+fn both_ways<T>(places: &[T], time: &dyn Fn(&T, &T) -> f64) -> Vec<Vec<f64>> {
+    let way = |a: &T, b: &T| 0.5 * (time(a, b) + time(b, a));
+    places
+        .iter()
+        .map(|a| places.iter().map(|b| way(a, b)).collect())
+        .collect()
 }
 
 fn nearest_neighbours(times: &[Vec<f64>]) -> Vec<usize> {

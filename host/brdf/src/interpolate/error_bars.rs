@@ -9,6 +9,7 @@ use super::Settings;
 use super::hold_out::{HoldOut, Prediction};
 use super::nodes::SIGMA_PER_MAD;
 use crate::bins::{Bin, Bins};
+use crate::dense::DenseBrdf;
 use crate::direction::{Vec3, dot};
 use crate::grid::Grid;
 use rayon::prelude::*;
@@ -52,6 +53,19 @@ pub struct ErrorBars {
     pub standard_error: [Vec<f32>; 3],
     /// An [`Origin`] a cell.
     pub origin: Vec<u8>,
+}
+
+impl ErrorBars {
+    /// Standard errors as shares of the values they belong to, mean over the channels, cell by cell.
+    pub fn relative(&self, values: &DenseBrdf) -> Vec<f32> {
+        let planes = values.planes();
+        (0..self.origin.len())
+            .map(|cell| {
+                let of_channel = |c: usize| self.standard_error[c][cell] / planes[c][cell];
+                (0..3).map(of_channel).sum::<f32>() / 3.0
+            })
+            .collect()
+    }
 }
 
 /// What turns a block's variance into a standard error.

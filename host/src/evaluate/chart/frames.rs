@@ -1,8 +1,7 @@
 //! Which samples take part: frames held out to judge by, and subsets of frames.
 
-use gonia_brdf::Direction;
-use gonia_brdf::Sample;
 use gonia_brdf::direction::{Vec3, angle_between, normalize};
+use gonia_brdf::{Direction, Pose, Sample};
 use std::collections::HashMap;
 
 /// One frame in so many is held out.
@@ -60,6 +59,18 @@ fn frames_of(samples: &[Sample]) -> Vec<Frame> {
         .collect();
     frames.sort_by_key(|frame| frame.number);
     frames
+}
+
+/// The poses that samples came from, as well as their mean directions tell; none where samples do not
+/// say their frames.
+pub fn poses_of(samples: &[Sample]) -> Vec<Pose> {
+    frames_of(samples)
+        .iter()
+        .map(|frame| Pose {
+            light: Direction::from_vec3(frame.light),
+            view: Direction::from_vec3(frame.view),
+        })
+        .collect()
 }
 
 fn directions(sample: &Sample) -> (Vec3, Vec3) {

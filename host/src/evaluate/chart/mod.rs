@@ -11,7 +11,7 @@ mod judge;
 mod table;
 
 pub use contender::{Contender, Family, standard};
-pub use frames::{ChartError, HeldOut, Subset};
+pub use frames::{ChartError, HeldOut, Subset, poses_of};
 pub use judge::{Judge, TestCounts};
 pub use table::{front, to_csv};
 

@@ -1,4 +1,4 @@
-//! Drawings of the accuracy bench.
+//! Drawings of the benches.
 
 use std::fmt::Write as _;
 
