@@ -13,7 +13,7 @@ use std::path::Path;
 use gonia_brdf::cellwise::{CellSettings, Predictor, Workspace};
 use gonia_brdf::direction::{Vec3, angle_between, dot, local_direction, normalize};
 use gonia_brdf::hemisphere::{Ring, directions};
-use gonia_brdf::interpolate::{self, Settings};
+use gonia_brdf::interpolate::{self, Known, Settings};
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::{Bins, Brdf, Direction, Grid, Sample};
 use rayon::prelude::*;
@@ -404,8 +404,9 @@ fn judge_default(
         nodes: row.neighbours.unwrap_or(Settings::DEFAULT.nodes),
         ..Settings::DEFAULT
     };
-    let settings = interpolate::select(bins, base).settings;
-    let dense = interpolate::fill(bins, &settings, &|_| ()).ok()?;
+    let known = Known::new(bins);
+    let settings = interpolate::select(&known, base).settings;
+    let dense = interpolate::fill(&known, &settings, &|_| ()).ok()?;
     let measured = |c: usize| {
         bins.bins()
             .iter()

@@ -2,7 +2,7 @@
 //! RMS of ln(f/f_true) over missing cells.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--nodes 128] [--half 0.5 | --sum 0.5]`
+//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 0.5 | --sum 0.5]`
 
 #![allow(clippy::expect_used)]
 
@@ -11,7 +11,7 @@ mod plan;
 use gonia_brdf::interpolate::hold_out::HoldOut;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Preset, Selection, Settings, fill, fill_with_errors, select,
+    Calibration, Coordinates, Known, Preset, Selection, Settings, fill, fill_with_errors, select,
 };
 use gonia_brdf::{Bins, Brdf, Grid};
 use plan::{cpu_seconds, material, measure};
@@ -36,7 +36,7 @@ fn main() {
         .collect();
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
     println!(
-        "material   samples     bins  bin s  select CPU-s  fill CPU-s  fill s  interior   all  void  settings"
+        "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior   all  void  settings"
     );
     for name in if asked.is_empty() {
         names.to_vec()
@@ -58,6 +58,7 @@ fn main() {
         let base = Settings {
             block_deg: option("--block", preset.block_deg),
             tolerance: option("--tolerance", preset.tolerance.into()) as f32,
+            budget: option("--budget", preset.budget.into()) as f32,
             nodes: option("--nodes", preset.nodes as f64) as usize,
             range: option("--range", preset.range.into()) as f32,
             nugget_min: option("--nugget", preset.nugget_min.into()) as f32,
@@ -74,8 +75,11 @@ fn main() {
             None
         };
         let cpu = cpu_seconds();
+        let known = Known::new(&bins);
+        let sort_s = cpu_seconds() - cpu;
+        let cpu = cpu_seconds();
         let selection = match fixed {
-            None => select(&bins, base),
+            None => select(&known, base),
             Some(coordinates) => Selection {
                 settings: Settings {
                     coordinates,
@@ -94,10 +98,10 @@ fn main() {
             );
         }
         let (cpu, start) = (cpu_seconds(), Instant::now());
-        let dense = fill(&bins, &selection.settings, &|_| ()).expect("enough bins");
+        let dense = fill(&known, &selection.settings, &|_| ()).expect("enough bins");
         let (fill_cpu, fill_s) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
         if arguments.iter().any(|a| a == "--errors") {
-            errors(&bins, &selection.settings, &*model);
+            errors(&known, &selection.settings, &*model);
         }
         let (across, inside) = bends(&dense, &selection.settings, &*model);
         println!("  bends of the error: {across:.5} across borders of blocks, {inside:.5} inside");
@@ -110,7 +114,7 @@ fn main() {
         let rms =
             |keep: &(dyn Fn(f64, f64) -> bool + Sync)| log_rms(&dense, &*model, &measured, keep);
         println!(
-            "{name:<9} {count:>9} {:>8} {bin_s:>6.2} {select_s:>13.1} {fill_cpu:>11.1} {fill_s:>7.1} {:>9.4} {:>5.3} {:>5.3}  {}",
+            "{name:<9} {count:>9} {:>8} {bin_s:>6.2} {sort_s:>11.1} {select_s:>13.1} {fill_cpu:>11.1} {fill_s:>7.1} {:>9.4} {:>5.3} {:>5.3}  {}",
             bins.bins().len(),
             rms(&|i, v| i <= 75.0 && v <= 75.0),
             rms(&|_, _| true),
@@ -188,14 +192,14 @@ fn matched(rows: &[[(f64, f64); 2]]) -> (f64, f64) {
 }
 
 /// Error bars: time, and how many of the truths lie within the 95 % interval of their cell.
-fn errors(bins: &Bins, settings: &Settings, model: &dyn Brdf) {
+fn errors(known: &Known, settings: &Settings, model: &dyn Brdf) {
     let cpu = cpu_seconds();
-    let calibration = Calibration::new(bins, settings).expect("enough frames");
+    let calibration = Calibration::new(known, settings).expect("enough frames");
     let calibrate_s = cpu_seconds() - cpu;
-    let (dense, bars) = fill_with_errors(bins, settings, &calibration, &|_| ()).expect("bins");
+    let (dense, bars) = fill_with_errors(known, settings, &calibration, &|_| ()).expect("bins");
     let fill_s = cpu_seconds() - cpu - calibrate_s;
     println!("  error bars: calibration {calibrate_s:.1} CPU-s, fill {fill_s:.1} CPU-s");
-    let held_out = HoldOut::new(bins, settings.coordinates, 3, 24, 8000).expect("enough frames");
+    let held_out = HoldOut::new(known, 3, 24, 8000).expect("enough frames");
     let predictions = held_out.predict(settings);
     let share = |keep: &dyn Fn(f64, f64, f64) -> bool| {
         let (mut inside, mut all) = (0, 0);
@@ -224,7 +228,7 @@ fn errors(bins: &Bins, settings: &Settings, model: &dyn Brdf) {
         share(&|i, v, _| i > 75.0 || v > 75.0),
         share(&|_, _, w| w > bright),
     );
-    let grid = bins.grid();
+    let grid = known.bins().grid();
     let n = grid.n_directions();
     let mut count = [[0usize; 2]; 4];
     for light in (0..n).step_by(7) {

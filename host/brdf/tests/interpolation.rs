@@ -8,7 +8,7 @@ use gonia_brdf::interpolate::nodes::nodes_of;
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Origin, Settings, fill, fill_with_errors, select,
+    Calibration, Coordinates, Known, Origin, Settings, fill, fill_with_errors, select,
 };
 use gonia_brdf::model::{Brdf, Kurt, KurtLobe};
 use gonia_brdf::{Bins, DenseBrdf, Direction, Grid, Sample};
@@ -79,15 +79,16 @@ fn held_out_bins_lie_within_their_error_bars() {
     let grid = Grid::with_step_deg(4.0).unwrap();
     for model in [broad(), Kurt::two_thread_fabric()] {
         let bins = Bins::new(grid, &measure(&model));
+        let known = Known::new(&bins);
         let settings = Settings {
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
-        let calibration = Calibration::new(&bins, &settings).unwrap();
+        let calibration = Calibration::new(&known, &settings).unwrap();
         // Other frames than those that the calibration held out.
         let mut shares = [[0.0f32; 2]; 4];
         for set in 0..4 {
-            let held_out = HoldOut::new(&bins, settings.coordinates, set, 24, 4000).unwrap();
+            let held_out = HoldOut::new(&known, set, 24, 4000).unwrap();
             let predictions = held_out.predict(&settings);
             let mut bright: Vec<f32> = predictions.iter().map(|p| p.bin.median[1]).collect();
             bright.sort_by(f32::total_cmp);
@@ -120,13 +121,14 @@ fn held_out_bins_lie_within_their_error_bars() {
 fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
     let grid = Grid::with_step_deg(6.0).unwrap();
     let bins = Bins::new(grid, &measure(&broad()));
+    let known = Known::new(&bins);
     let settings = Settings {
         nodes: 48,
         ..Settings::DEFAULT
     };
-    let calibration = Calibration::new(&bins, &settings).unwrap();
-    let (dense, bars) = fill_with_errors(&bins, &settings, &calibration, &|_| ()).unwrap();
-    assert_eq!(dense, fill(&bins, &settings, &|_| ()).unwrap());
+    let calibration = Calibration::new(&known, &settings).unwrap();
+    let (dense, bars) = fill_with_errors(&known, &settings, &calibration, &|_| ()).unwrap();
+    assert_eq!(dense, fill(&known, &settings, &|_| ()).unwrap());
     for plane in &bars.standard_error {
         assert!(plane.iter().all(|e| e.is_finite() && *e >= 0.0));
     }
@@ -152,13 +154,14 @@ fn a_gap_in_azimuth_is_extrapolated() {
         !in_gap(s.theta_i_deg, s.phi_i_deg) && !in_gap(s.theta_v_deg, s.phi_v_deg)
     });
     let bins = Bins::new(grid, &samples);
+    let known = Known::new(&bins);
     let settings = Settings {
         nodes: 32,
         tolerance: f32::INFINITY,
         ..Settings::DEFAULT
     };
-    let calibration = Calibration::new(&bins, &settings).unwrap();
-    let (_, bars) = fill_with_errors(&bins, &settings, &calibration, &|_| ()).unwrap();
+    let calibration = Calibration::new(&known, &settings).unwrap();
+    let (_, bars) = fill_with_errors(&known, &settings, &calibration, &|_| ()).unwrap();
     let origin = |i: (f64, f64), v: (f64, f64)| {
         let at = |(theta, phi)| grid.nearest(theta, phi).unwrap();
         bars.origin[grid.cell(at(i), at(v))]
@@ -192,7 +195,7 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
-        let levels = Levels::new(nodes_of(bins.bins().iter(), settings.coordinates));
+        let levels = Levels::new(nodes_of(bins.bins(), settings.coordinates));
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let around = |d: Vec3| {
             let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
@@ -215,8 +218,9 @@ fn samples_without_frames_are_held_out_by_clusters() {
     let mut samples = measure(&broad());
     samples.iter_mut().for_each(|s| s.frame = Sample::NO_FRAME);
     let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &samples);
+    let known = Known::new(&bins);
     let coordinates = Coordinates::SumDifference { weight: 1.0 };
-    let held_out = HoldOut::new(&bins, coordinates, 0, 24, 500).unwrap();
+    let held_out = HoldOut::new(&known, 0, 24, 500).unwrap();
     let predictions = held_out.predict(&Settings {
         coordinates,
         ..Settings::DEFAULT
@@ -227,7 +231,7 @@ fn samples_without_frames_are_held_out_by_clusters() {
         .filter(|p| p.residual(1).unwrap().abs() < 0.1)
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
-    assert_eq!(select(&bins, Settings::DEFAULT).trials.len(), 4);
+    assert_eq!(select(&known, Settings::DEFAULT).trials.len(), 4);
 }
 
 #[test]
@@ -236,6 +240,7 @@ fn blocks_leave_no_seams_whole_or_cut() {
     let grid = Grid::with_step_deg(3.0).unwrap();
     for (model, tolerance) in [(broad(), f32::INFINITY), (Kurt::two_thread_fabric(), 1.0)] {
         let bins = Bins::new(grid, &measure_every(2, &model));
+        let known = Known::new(&bins);
         let settings = Settings {
             block_deg: 12.0,
             tolerance,
@@ -243,7 +248,7 @@ fn blocks_leave_no_seams_whole_or_cut() {
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
-        let dense = fill(&bins, &settings, &|_| ()).unwrap();
+        let dense = fill(&known, &settings, &|_| ()).unwrap();
         let (across, inside) = bends(&dense, &model, settings.block_deg);
         println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
         // Without blending 1.6 times.
@@ -290,4 +295,43 @@ fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
     let across: f64 = rows.iter().map(|row| row[0][0]).sum();
     let inside: f64 = rows.iter().map(|[a, i]| i[0] / i[1] * a[1]).sum();
     ((across / count).sqrt(), (inside / count).sqrt())
+}
+
+#[test]
+fn on_a_sparse_plan_cutting_stays_within_its_budget() {
+    let grid = Grid::with_step_deg(4.0).unwrap();
+    let bins = Bins::new(grid, &measure(&Kurt::two_thread_fabric()));
+    let known = Known::new(&bins);
+    let chosen = |budget: f32| {
+        let base = Settings {
+            block_deg: 20.0,
+            nodes: 48,
+            budget,
+            ..Settings::DEFAULT
+        };
+        select(&known, base).settings
+    };
+    // What the plan asks for, and a half of it.
+    let blocks_cut = |settings: &Settings| {
+        let levels = Levels::new(nodes_of(bins.bins(), settings.coordinates));
+        let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
+        let mut refiner = Refiner::default();
+        let mut blocks = 0;
+        for (k, p) in patches.iter().enumerate() {
+            for q in &patches[k..] {
+                let before = refiner.count.cut;
+                refiner.solve(&levels, settings, p, q);
+                blocks += (refiner.count.cut - before) * p.children.len() * q.children.len();
+            }
+        }
+        blocks as f32 / refiner.count.pairs as f32
+    };
+    let unlimited = chosen(f32::INFINITY);
+    assert_eq!(unlimited.tolerance, Settings::DEFAULT.tolerance);
+    let wanted = blocks_cut(&unlimited);
+    let limited = chosen(0.5 * wanted);
+    assert!(limited.tolerance > unlimited.tolerance);
+    let spent = blocks_cut(&limited);
+    println!("{wanted} blocks a pair wanted, {spent} spent");
+    assert!((0.35..0.65).contains(&(spent / wanted)), "{spent} {wanted}");
 }

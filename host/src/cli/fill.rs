@@ -10,7 +10,9 @@ use crate::dataset::samples::read_samples_of_all;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::{self, CellSettings};
-use gonia_brdf::interpolate::{self, ByRows, Calibration, ErrorBars, Origin, Preset, Settings};
+use gonia_brdf::interpolate::{
+    self, ByRows, Calibration, ErrorBars, Known, Origin, Preset, Settings,
+};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::{Path, PathBuf};
 
@@ -59,7 +61,7 @@ pub struct How {
     #[arg(long, value_name = "N")]
     pub nodes: Option<usize>,
     /// Cut a block in finer ones where they differ by more than this many times the samples'
-    /// noise; 0 cuts all, inf none [default: the preset's]
+    /// noise; 0 cuts all, inf none [default: the preset's, or more where cutting would cost too much]
     #[arg(long, value_name = "T")]
     pub tolerance: Option<f32>,
 }
@@ -99,6 +101,8 @@ impl How {
             block_deg: self.block.unwrap_or(preset.block_deg.max(2.0 * self.step)),
             nodes: self.nodes.unwrap_or(preset.nodes),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
+            // Who asks for a tolerance gets it.
+            budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
             ..preset
         };
         if !(self.step..=45.0).contains(&settings.block_deg) {
@@ -148,22 +152,23 @@ pub fn fill(
     let total = samples.len();
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
+    let known = progress.stage("sorting", |_| anyhow::Ok(Known::new(&bins)))?;
     let settings = progress.stage("choosing settings", |_| {
-        anyhow::Ok(interpolate::select(&bins, base).settings)
+        anyhow::Ok(interpolate::select(&known, base).settings)
     })?;
     let (dense, errors) = if with_errors {
         let calibration = progress.stage("calibrating error bars", |_| {
-            Calibration::new(&bins, &settings).context(
+            Calibration::new(&known, &settings).context(
                 "too few frames to calibrate error bars: measure more poses, or leave --error out",
             )
         })?;
         let (dense, errors) = progress.stage("interpolating", |tell| {
-            interpolate::fill_with_errors(&bins, &settings, &calibration, tell)
+            interpolate::fill_with_errors(&known, &settings, &calibration, tell)
         })?;
         (dense, Some(errors))
     } else {
         let dense = progress.stage("interpolating", |tell| {
-            interpolate::fill(&bins, &settings, tell)
+            interpolate::fill(&known, &settings, tell)
         })?;
         (dense, None)
     };
@@ -298,16 +303,16 @@ impl Fill {
         let total = samples.len();
         let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
         drop(samples);
+        let known = progress.stage("sorting", |_| anyhow::Ok(Known::new(&bins)))?;
         let settings = progress.stage("choosing settings", |_| {
-            anyhow::Ok(interpolate::select(&bins, base).settings)
+            anyhow::Ok(interpolate::select(&known, base).settings)
         })?;
         let rows = progress
-            .stage("fitting", |tell| ByRows::new(&bins, &settings, tell))
+            .stage("fitting", |tell| ByRows::new(&known, &settings, tell))
             .with_context(|| self.names())?;
         let mut facts = provenance_of(&settings);
         facts.insert("samples".into(), self.names());
         let (outside, filled) = (bins.outside(), bins.bins().len());
-        drop(bins);
         progress.stage("interpolating and writing", |tell| {
             write_dense_by_rows(&self.output, grid, &rows, self.scale.into(), &facts, tell)
         })?;

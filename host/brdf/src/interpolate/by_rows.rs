@@ -7,8 +7,8 @@
 use super::Settings;
 use super::blend::{Corners, Shifts};
 use super::fill::{FillError, Fit, bounded_exp};
+use super::known::Known;
 use super::refine::Refiner;
-use crate::bins::Bins;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -32,11 +32,11 @@ impl<'a> ByRows<'a> {
     /// # Errors
     /// Too few bins.
     pub fn new(
-        bins: &Bins,
+        known: &'a Known,
         settings: &'a Settings,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self, FillError> {
-        let fit = Fit::new(bins, settings)?;
+        let fit = Fit::new(known, settings)?;
         let corners = fit.solve_pairs(false, progress, &|_, _, _| ());
         Ok(Self { fit, corners })
     }
@@ -89,7 +89,7 @@ impl<'a> ByRows<'a> {
         let (first, second) = (p.min(q), p.max(q));
         let pair = (&patches[first], &patches[second]);
         work.refiner
-            .solve(&self.fit.levels, settings, pair.0, pair.1);
+            .solve(self.fit.levels(), settings, pair.0, pair.1);
         work.logs.clear();
         work.logs.extend_from_slice(work.refiner.logs());
         let numbers = (first, second);
@@ -113,6 +113,7 @@ impl<'a> ByRows<'a> {
 mod tests {
     use super::super::fill;
     use super::*;
+    use crate::bins::Bins;
     use crate::grid::Grid;
     use crate::model::{Brdf, Kurt};
     use crate::sample::Sample;
@@ -149,10 +150,11 @@ mod tests {
             nodes: 32,
             ..Settings::DEFAULT
         };
-        let dense = fill(&bins, &settings, &|_| ()).unwrap();
+        let known = Known::new(&bins);
+        let dense = fill(&known, &settings, &|_| ()).unwrap();
         let n = grid.n_directions();
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
-        ByRows::new(&bins, &settings, &|_| ())
+        ByRows::new(&known, &settings, &|_| ())
             .unwrap()
             .each_row(&|_| (), &|light, row| {
                 let mut planes = planes.lock().map_err(|_| ())?;

@@ -45,6 +45,32 @@ impl Coordinates {
             ((light[2] - view[2]) * w) as f32,
         ]
     }
+
+    /// Where the pair of unit vectors at `point` lies in other coordinates.
+    pub fn convert(&self, point: &Point, to: Coordinates) -> Point {
+        let (from_half, from) = self.kind();
+        let (to_half, to) = to.kind();
+        let ratio = (to / from) as f32;
+        let difference = [point[3] * ratio, point[4] * ratio, point[5] * ratio];
+        // |i + v|² + |i − v|² = 4.
+        let length2: f32 = difference.iter().map(|d| d * d).sum();
+        let sum = (4.0 - 2.0 / (to * to) as f32 * length2).max(1e-6).sqrt();
+        let scale = match (from_half, to_half) {
+            (true, false) => 0.5 * sum,
+            (false, true) => 2.0 / sum,
+            _ => 1.0,
+        };
+        let [x, y, z] = [point[0] * scale, point[1] * scale, point[2] * scale];
+        [x, y, z, difference[0], difference[1], difference[2]]
+    }
+
+    /// Whether the sum is normalised, and the weight of the difference.
+    fn kind(&self) -> (bool, f64) {
+        match *self {
+            Self::HalfDifference { weight } => (true, weight),
+            Self::SumDifference { weight } => (false, weight),
+        }
+    }
 }
 
 impl std::fmt::Display for Coordinates {
@@ -78,6 +104,26 @@ mod tests {
             for k in 0..3 {
                 assert_eq!(p[k], q[k]);
                 assert_eq!(p[k + 3], -q[k + 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn converted_points_are_those_of_the_directions() {
+        let systems = [
+            Coordinates::HalfDifference { weight: 0.5 },
+            Coordinates::HalfDifference { weight: 0.25 },
+            Coordinates::SumDifference { weight: 1.0 },
+        ];
+        let at = |theta, phi| Direction::from_deg(theta, phi).to_vec3();
+        for (i, v) in [((10.0, 20.0), (40.0, 80.0)), ((86.0, 0.0), (84.0, 179.0))] {
+            let (i, v) = (at(i.0, i.1), at(v.0, v.1));
+            for (from, to) in systems
+                .iter()
+                .flat_map(|a| systems.iter().map(move |b| (a, b)))
+            {
+                let (got, expected) = (from.convert(&from.point(i, v), *to), to.point(i, v));
+                assert!(distance2(&got, &expected) < 1e-8, "{got:?} {expected:?}");
             }
         }
     }

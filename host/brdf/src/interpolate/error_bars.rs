@@ -7,6 +7,7 @@
 
 use super::Settings;
 use super::hold_out::{HoldOut, Prediction};
+use super::known::Known;
 use super::nodes::SIGMA_PER_MAD;
 use crate::bins::{Bin, Bins};
 use crate::dense::DenseBrdf;
@@ -89,18 +90,12 @@ struct Classes {
 impl Calibration {
     /// Calibrates on bins held out. `None` when too few frames (or clusters of directions) are there
     /// to hold any out.
-    pub fn new(bins: &Bins, settings: &Settings) -> Option<Self> {
-        let sets = HoldOut::sets(bins);
+    pub fn new(known: &Known, settings: &Settings) -> Option<Self> {
+        let sets = HoldOut::sets(known.bins());
         let mut predictions = Vec::new();
         for set in 0..sets {
             let set = ONE_IN - 1 - set;
-            if let Some(held_out) = HoldOut::new(
-                bins,
-                settings.coordinates,
-                set,
-                ONE_IN,
-                TESTS / sets as usize,
-            ) {
+            if let Some(held_out) = HoldOut::new(known, set, ONE_IN, TESTS / sets as usize) {
                 predictions.extend(held_out.predict(settings));
             }
         }

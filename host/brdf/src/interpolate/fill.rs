@@ -3,11 +3,10 @@
 use super::Settings;
 use super::blend::{Corners, Shifts};
 use super::error_bars::{Calibration, ErrorBars, Reach, write_measured};
+use super::known::Known;
 use super::levels::Levels;
-use super::nodes::nodes_of;
 use super::patches::{Cover, Patch, cover};
 use super::refine::Refiner;
-use crate::bins::Bins;
 use crate::dense::DenseBrdf;
 use crate::grid::Grid;
 use rayon::prelude::*;
@@ -27,25 +26,26 @@ pub enum FillError {
 /// Interpolates every cell of the bins' grid. Positive, finite, exactly reciprocal, one value a
 /// pole. `progress` is told the share done, 0 ..= 1, from any thread.
 pub fn fill(
-    bins: &Bins,
+    known: &Known,
     settings: &Settings,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<DenseBrdf, FillError> {
     Ok(DenseBrdf::from_planes(
-        bins.grid(),
-        solve(bins, settings, None, progress)?.0,
+        known.bins().grid(),
+        solve(known, settings, None, progress)?.0,
     ))
 }
 
 /// The same with a standard error for each cell. It takes about twice the time.
 pub fn fill_with_errors(
-    bins: &Bins,
+    known: &Known,
     settings: &Settings,
     calibration: &Calibration,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(DenseBrdf, ErrorBars), FillError> {
+    let bins = known.bins();
     let grid = bins.grid();
-    let (values, standard_error) = solve(bins, settings, Some(calibration), progress)?;
+    let (values, standard_error) = solve(known, settings, Some(calibration), progress)?;
     let reach = Reach::new(bins);
     let origin = (0..grid.n_directions())
         .into_par_iter()
@@ -66,12 +66,12 @@ type Planes = [Vec<f32>; 3];
 
 /// Values of all cells, and with a calibration their standard errors (else planes of no length).
 fn solve(
-    bins: &Bins,
+    known: &Known,
     settings: &Settings,
     calibration: Option<&Calibration>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(Planes, Planes), FillError> {
-    let fit = Fit::new(bins, settings)?;
+    let fit = Fit::new(known, settings)?;
     let (grid, patches) = (fit.grid, &fit.cover.patches);
     let values = SharedPlanes::new(grid.n_cells());
     let errors = SharedPlanes::new(calibration.map_or(0, |_| grid.n_cells()));
@@ -123,12 +123,14 @@ fn solve(
 pub(super) struct Fit<'a> {
     pub grid: Grid,
     pub settings: &'a Settings,
-    pub levels: Levels,
+    known: &'a Known<'a>,
+    moved: Option<Levels>,
     pub cover: Cover,
 }
 
 impl<'a> Fit<'a> {
-    pub(super) fn new(bins: &Bins, settings: &'a Settings) -> Result<Self, FillError> {
+    pub(super) fn new(known: &'a Known, settings: &'a Settings) -> Result<Self, FillError> {
+        let bins = known.bins();
         if bins.bins().len() < MIN_BINS {
             return Err(FillError::TooFewBins(bins.bins().len()));
         }
@@ -136,9 +138,15 @@ impl<'a> Fit<'a> {
         Ok(Self {
             grid,
             settings,
-            levels: Levels::new(nodes_of(bins.bins().iter(), settings.coordinates)),
+            known,
+            moved: known.moved(settings.coordinates),
             cover: cover(grid, &settings.patch_sizes_deg()),
         })
+    }
+
+    /// The nodes, in the coordinates of the settings.
+    pub(super) fn levels(&self) -> &Levels {
+        self.moved.as_ref().unwrap_or(self.known.levels())
     }
 
     /// Solves all pairs of patches, shows each to `each`, and averages at their corners.
@@ -159,7 +167,7 @@ impl<'a> Fit<'a> {
                 refiner.with_variances = with_variances;
                 let mut at_corners = Vec::new();
                 for q in &patches[p..] {
-                    refiner.solve(&self.levels, self.settings, &patches[p], q);
+                    refiner.solve(self.levels(), self.settings, &patches[p], q);
                     at_corners.extend_from_slice(refiner.corners());
                     each(refiner, &patches[p], q);
                 }
@@ -270,6 +278,7 @@ pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bins::Bins;
     use crate::direction::Direction;
     use crate::model::{Brdf, Kurt};
     use crate::sample::Sample;
@@ -317,7 +326,7 @@ mod tests {
             block_deg: 20.0,
             ..Settings::DEFAULT
         };
-        let dense = fill(&coarse, &settings, &|_| ()).unwrap();
+        let dense = fill(&Known::new(&coarse), &settings, &|_| ()).unwrap();
         let n = grid.n_directions();
         let mut sum = 0.0;
         for light in 0..n {
@@ -344,7 +353,7 @@ mod tests {
         let model = Kurt::white_reference_fabric();
         let bins = Bins::new(Grid::PAPER, &samples(&model, 7));
         assert_eq!(
-            fill(&bins, &Settings::DEFAULT, &|_| ()),
+            fill(&Known::new(&bins), &Settings::DEFAULT, &|_| ()),
             Err(FillError::TooFewBins(7))
         );
     }

@@ -5,9 +5,7 @@
 //! number of a frame are held out by clusters of directions instead.
 
 use super::Settings;
-use super::coordinates::Coordinates;
-use super::levels::Levels;
-use super::nodes::nodes_of;
+use super::known::{Known, MANY_BINS};
 use super::patches::{Patch, cover};
 use super::refine::Refiner;
 use crate::bins::{Bin, Bins};
@@ -21,20 +19,17 @@ const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
-/// With fewer bins than this, one set of frames would decide by chance; several are cheap then.
-const MANY_BINS: usize = 1_000_000;
-/// Sets of frames to hold out in turn, where there are few bins.
+/// Sets of frames to hold out in turn, where there are few bins: one would decide by chance, and several
+/// are cheap then.
 const SETS: u32 = 4;
 
 /// Some bins held out of all.
 pub struct HoldOut<'a> {
-    grid: Grid,
-    /// Bins that are known.
-    training: Vec<&'a Bin>,
+    known: &'a Known<'a>,
+    /// Of each bin, whether it is known.
+    training: Vec<bool>,
     /// Bins that are to be predicted, each with the number of held-out bins it stands for.
     tests: Vec<(&'a Bin, f32)>,
-    levels: Levels,
-    coordinates: Coordinates,
 }
 
 /// A held-out bin and what the others make of it.
@@ -62,36 +57,29 @@ impl<'a> HoldOut<'a> {
     /// Holds out one group of frames (or clusters) in `one_in`, the `set`th choice of several, and of
     /// their bins about `tests`: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
-    pub fn new(
-        bins: &'a Bins,
-        coordinates: Coordinates,
-        set: u32,
-        one_in: u32,
-        tests: usize,
-    ) -> Option<Self> {
-        let framed = bins.bins().iter().any(|b| b.frame != Sample::NO_FRAME);
+    pub fn new(known: &'a Known<'a>, set: u32, one_in: u32, tests: usize) -> Option<Self> {
+        let bins = known.bins().bins();
+        let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
         let held_out = |bin: &Bin| {
             let group = if framed { bin.frame } else { cluster(bin) };
             hash(group).wrapping_add(set).is_multiple_of(one_in)
         };
         // Bins of several frames may hold a part of a held-out frame, so none of them takes part.
-        let known = |bin: &&Bin| !framed || bin.frame != Sample::NO_FRAME;
-        let (candidates, training): (Vec<&Bin>, Vec<&Bin>) = bins
-            .bins()
+        let takes_part = |bin: &Bin| !framed || bin.frame != Sample::NO_FRAME;
+        let training: Vec<bool> = bins
             .iter()
-            .filter(known)
-            .partition(|bin| held_out(bin));
+            .map(|bin| takes_part(bin) && !held_out(bin))
+            .collect();
+        let candidates = bins
+            .iter()
+            .filter(|bin| takes_part(bin) && held_out(bin))
+            .collect();
         let tests = pick(candidates, tests);
-        if tests.len() < TESTS_MIN || training.len() < TESTS_MIN {
-            return None;
-        }
-        let levels = Levels::new(nodes_of(training.iter().copied(), coordinates));
-        Some(Self {
-            grid: bins.grid(),
+        let trained = training.iter().filter(|known| **known).count();
+        (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
+            known,
             training,
             tests,
-            levels,
-            coordinates,
         })
     }
 
@@ -106,20 +94,21 @@ impl<'a> HoldOut<'a> {
 
     /// Predicts the tests, by the very blocks that a fill with these settings would use.
     pub fn predict(&self, settings: &Settings) -> Vec<Prediction<'a>> {
-        let moved = (settings.coordinates != self.coordinates).then(|| {
-            self.levels
-                .moved(|node| node.point_of(self.training[node.bin()], settings.coordinates))
-        });
-        let levels = moved.as_ref().unwrap_or(&self.levels);
-        let patches = cover(self.grid, &settings.patch_sizes_deg()).patches;
-        let patch_of = patch_of_direction(self.grid, &patches);
+        let grid = self.known.bins().grid();
+        let sorted = self.known.sorted_for(settings.coordinates);
+        let nodes = sorted
+            .as_ref()
+            .unwrap_or(self.known)
+            .part(settings.coordinates, |bin| self.training[bin]);
+        let patches = cover(grid, &settings.patch_sizes_deg()).patches;
+        let patch_of = patch_of_direction(grid, &patches);
         self.tests
             .par_iter()
             .map_init(Refiner::default, |refiner, (bin, weight)| {
-                let (light, view) = self.grid.light_and_view(bin.cell as usize);
+                let (light, view) = grid.light_and_view(bin.cell as usize);
                 let (p, q) = (&patches[patch_of[light]], &patches[patch_of[view]]);
                 let place = (bin.light.map(f64::from), bin.view.map(f64::from));
-                let (log, variance) = refiner.predict(levels, settings, (p, q), place);
+                let (log, variance) = refiner.predict(&nodes, settings, (p, q), place);
                 Prediction {
                     bin,
                     weight: *weight,

@@ -8,11 +8,12 @@
 //! the children of the merged ones.
 
 use super::coordinates::{Point, distance2};
-use super::nodes::{Node, SIGMA_PER_MAD};
+use super::nodes::{Node, SIGMA_PER_MAD, merge};
 use crate::bins::median;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;
+use std::ops::Range;
 
 /// Nodes merged into one: at least this many, and less than twice as many.
 const MERGE: usize = 6;
@@ -44,6 +45,19 @@ pub struct Levels {
 /// A neighbour: squared distance and number of the node.
 pub type Found = (f32, u32);
 
+/// What a block can be fitted to: nodes at two levels of detail, and the nearest of them.
+pub trait Neighbours {
+    /// Writes merged nodes near a place to `found`, in no order: more than `n`, and with few
+    /// exceptions the nearest `n` among them. Fewer when there are not as many.
+    fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>);
+
+    /// Writes the bins of merged nodes to `found`, with their distances from a place.
+    fn expand(&self, place: &Point, merged: &[Found], found: &mut Vec<Found>);
+
+    /// A node that was found.
+    fn node(&self, detail: Detail, number: u32) -> Node;
+}
+
 impl Levels {
     /// Sorts and merges the nodes.
     pub fn new(mut bins: Vec<Node>) -> Self {
@@ -72,12 +86,12 @@ impl Levels {
 
     fn sorted(bins: Vec<Node>, starts: Vec<u32>) -> Self {
         let merged: Vec<Node> = starts
-            .windows(2)
-            .filter_map(|w| merge(&bins[w[0] as usize..w[1] as usize]))
+            .par_windows(2)
+            .filter_map(|w| merge(here(&bins[w[0] as usize..w[1] as usize])))
             .collect();
         let middles: Vec<Point> = merged
             .chunks(GROUP)
-            .filter_map(merge)
+            .filter_map(|nodes| merge(here(nodes)))
             .map(|n| n.point)
             .collect();
         let tree = ImmutableKdTree::new_from_slice(&middles).ok();
@@ -97,12 +111,43 @@ impl Levels {
         }
     }
 
-    /// Writes merged nodes near a place to `found`, in no order: more than `n`, and with few
-    /// exceptions the nearest `n` among them. Fewer when there are not as many.
-    pub fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>) {
+    /// The bins' own nodes.
+    pub(super) fn bins(&self) -> &[Node] {
+        &self.bins
+    }
+
+    /// The numbers of the bins that are merged into one.
+    pub(super) fn bins_of(&self, merged: usize) -> Range<usize> {
+        self.starts[merged] as usize..self.starts[merged + 1] as usize
+    }
+
+    /// Number of groups of merged nodes.
+    pub(super) fn groups(&self) -> usize {
+        self.merged.len().div_ceil(GROUP)
+    }
+
+    /// The numbers of the merged nodes in a group.
+    pub(super) fn group(&self, number: usize) -> Range<usize> {
+        let start = number * GROUP;
+        start..(start + GROUP).min(self.merged.len())
+    }
+
+    /// The bins of a group.
+    pub(super) fn bins_of_group(&self, number: usize) -> &[Node] {
+        let merged = self.group(number);
+        &self.bins[self.starts[merged.start] as usize..self.starts[merged.end] as usize]
+    }
+
+    /// How many groups are looked at for the nearest `n` merged nodes.
+    pub(super) fn groups_for(n: usize) -> usize {
+        ((n as f64 * SURPLUS) as usize).div_ceil(GROUP)
+    }
+}
+
+impl Neighbours for Levels {
+    fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>) {
         found.clear();
-        let groups = ((n as f64 * SURPLUS) as usize).div_ceil(GROUP);
-        let (Some(tree), Some(groups)) = (&self.tree, NonZero::new(groups)) else {
+        let (Some(tree), Some(groups)) = (&self.tree, NonZero::new(Self::groups_for(n))) else {
             return;
         };
         for group in tree
@@ -110,24 +155,29 @@ impl Levels {
             .nearest_n::<SquaredEuclidean<f32>>(groups)
             .execute()
         {
-            let start = group.item as usize * GROUP;
-            let end = (start + GROUP).min(self.merged.len());
-            for k in start..end {
+            for k in self.group(group.item as usize) {
                 found.push((distance2(place, &self.merged[k].point), k as u32));
             }
         }
     }
 
-    /// Writes the bins of merged nodes to `found`, with their distances from a place.
-    pub fn expand(&self, place: &Point, merged: &[Found], found: &mut Vec<Found>) {
+    fn expand(&self, place: &Point, merged: &[Found], found: &mut Vec<Found>) {
         found.clear();
         for (_, parent) in merged {
-            let parent = *parent as usize;
-            for k in self.starts[parent]..self.starts[parent + 1] {
-                found.push((distance2(place, &self.bins[k as usize].point), k));
+            for k in self.bins_of(*parent as usize) {
+                found.push((distance2(place, &self.bins[k].point), k as u32));
             }
         }
     }
+
+    fn node(&self, detail: Detail, number: u32) -> Node {
+        self.nodes(detail)[number as usize]
+    }
+}
+
+/// Nodes at their own places.
+fn here(nodes: &[Node]) -> impl Iterator<Item = (Point, &Node)> {
+    nodes.iter().map(|node| (node.point, node))
 }
 
 /// Keeps the nearest `n` and returns the distance of the farthest of them.
@@ -181,28 +231,6 @@ fn widest_axis(nodes: &[Node]) -> usize {
     (0..6)
         .max_by(|a, b| width(a).total_cmp(&width(b)))
         .unwrap_or(0)
-}
-
-/// The mean of nodes, weighted by count; `None` of none.
-fn merge(nodes: &[Node]) -> Option<Node> {
-    let mut point = [0.0; 6];
-    let mut log_value = [0.0; 3];
-    let mut count = 0.0;
-    for node in nodes {
-        for k in 0..6 {
-            point[k] += node.count * node.point[k];
-        }
-        for c in 0..3 {
-            log_value[c] += node.count * node.log_value[c];
-        }
-        count += node.count;
-    }
-    (count > 0.0).then(|| Node {
-        point: point.map(|p| p / count),
-        log_value: log_value.map(|v| v / count),
-        count,
-        source: u32::MAX,
-    })
 }
 
 /// A node of one or two samples that lies this many robust standard deviations of its neighbours

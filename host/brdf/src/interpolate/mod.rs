@@ -8,12 +8,14 @@
 
 pub mod blend;
 pub mod block;
+pub mod budget;
 pub mod by_rows;
 pub mod cholesky;
 pub mod coordinates;
 pub mod error_bars;
 pub mod fill;
 pub mod hold_out;
+pub mod known;
 pub mod levels;
 pub mod nodes;
 pub mod patches;
@@ -24,6 +26,7 @@ pub use by_rows::ByRows;
 pub use coordinates::Coordinates;
 pub use error_bars::{Calibration, ErrorBars, Origin};
 pub use fill::{FillError, fill, fill_with_errors};
+pub use known::Known;
 pub use select::{Selection, Trial, select};
 
 /// How to interpolate.
@@ -34,11 +37,14 @@ pub struct Settings {
     /// A block is cut where a finer one differs from it by more than this many standard deviations
     /// of one sample: 0 cuts everywhere, infinity nowhere.
     pub tolerance: f32,
+    /// What cutting may cost, in fine blocks a pair of patches, on average: [`select`] raises the
+    /// tolerance to it.
+    pub budget: f32,
     /// Nodes a block.
     pub nodes: usize,
     /// Where distances are taken.
     pub coordinates: Coordinates,
-    /// Range of the kernel in radii of the neighbourhood; at least 2.
+    /// Range of the kernel in radii of the neighbourhood; at least 3.5.
     pub range: f32,
     /// Variance of the natural logarithm of one sample.
     pub noise_variance: f32,
@@ -75,15 +81,16 @@ impl Preset {
 
     /// Its settings; [`select`] chooses the coordinates and measures the noise.
     pub const fn settings(self) -> Settings {
-        let (block_deg, tolerance, nodes) = match self {
-            Preset::Preview => (8.0, f32::INFINITY, 32),
-            Preset::Fast => (8.0, 2.0, 64),
-            Preset::Default => (8.0, 1.0, 128),
-            Preset::Best => (8.0, 0.5, 256),
+        let (block_deg, tolerance, budget, nodes) = match self {
+            Preset::Preview => (8.0, f32::INFINITY, 0.0, 32),
+            Preset::Fast => (8.0, 2.0, 2.0, 64),
+            Preset::Default => (8.0, 1.0, 4.0, 128),
+            Preset::Best => (8.0, 0.5, f32::INFINITY, 256),
         };
         Settings {
             block_deg,
             tolerance,
+            budget,
             nodes,
             coordinates: Coordinates::HalfDifference { weight: 0.5 },
             range: 8.0,
@@ -110,7 +117,12 @@ impl Settings {
 
     /// By how much blending may shift a block in any case, in natural logarithms.
     fn blend_limit(&self) -> f32 {
-        2.0 * self.noise_variance.sqrt().max(refine::NOISE_MIN)
+        2.0 * self.noise_sigma()
+    }
+
+    /// Standard deviation of the logarithm of one sample, as far as two fits can agree.
+    fn noise_sigma(&self) -> f32 {
+        self.noise_variance.sqrt().max(NOISE_MIN)
     }
 
     fn block(&self) -> block::BlockSettings {
@@ -122,11 +134,14 @@ impl Settings {
     }
 }
 
+/// Two fits through different nodes never agree better than this, whatever the samples' noise.
+const NOISE_MIN: f32 = 0.003;
+
 impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "blocks of {} deg, tolerance {} noise, {} nodes, {}, range {} radii, noise {:.2} %, nugget at least {:e}",
+            "blocks of {} deg, tolerance {:.2} noise, {} nodes, {}, range {} radii, noise {:.2} %, nugget at least {:e}",
             self.block_deg,
             self.tolerance,
             self.nodes,

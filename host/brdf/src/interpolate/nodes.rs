@@ -3,6 +3,7 @@
 
 use super::coordinates::{Coordinates, Point};
 use crate::bins::{Bin, median};
+use rayon::prelude::*;
 
 /// One known value.
 #[derive(Clone, Copy, Debug)]
@@ -23,15 +24,6 @@ impl Node {
     pub fn bin(&self) -> usize {
         (self.source / 2) as usize
     }
-
-    /// Where a bin of this node lies in other coordinates.
-    pub fn point_of(&self, bin: &Bin, coordinates: Coordinates) -> Point {
-        let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
-        match self.source % 2 {
-            0 => coordinates.point(light, view),
-            _ => coordinates.point(view, light),
-        }
-    }
 }
 
 /// A median at or below this share of the material's median brightness is raised to it: noise can
@@ -39,25 +31,45 @@ impl Node {
 const FLOOR_SHARE: f32 = 1e-4;
 
 /// Nodes of bins, numbered as they come, and of their mirror images (light and view exchanged).
-pub fn nodes_of<'a>(
-    bins: impl Iterator<Item = &'a Bin> + Clone,
-    coordinates: Coordinates,
-) -> Vec<Node> {
-    let floor = floor_of(bins.clone());
-    let mut nodes = Vec::with_capacity(2 * bins.size_hint().0);
-    for (number, bin) in bins.enumerate() {
-        for mirrored in 0..2 {
-            let mut node = Node {
-                point: [0.0; 6],
-                log_value: [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln()),
-                count: bin.count as f32,
-                source: 2 * number as u32 + mirrored,
-            };
-            node.point = node.point_of(bin, coordinates);
-            nodes.push(node);
+pub fn nodes_of(bins: &[Bin], coordinates: Coordinates) -> Vec<Node> {
+    let floor = floor_of(bins.iter());
+    bins.par_iter()
+        .enumerate()
+        .flat_map_iter(|(number, bin)| {
+            let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
+            let log_value = [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln());
+            [(light, view), (view, light)].into_iter().zip([0, 1]).map(
+                move |((light, view), mirrored)| Node {
+                    point: coordinates.point(light, view),
+                    log_value,
+                    count: bin.count as f32,
+                    source: 2 * number as u32 + mirrored,
+                },
+            )
+        })
+        .collect()
+}
+
+/// The mean of nodes at given places, weighted by count; `None` of none.
+pub(super) fn merge<'a>(nodes: impl Iterator<Item = (Point, &'a Node)>) -> Option<Node> {
+    let mut point = [0.0; 6];
+    let mut log_value = [0.0; 3];
+    let mut count = 0.0;
+    for (place, node) in nodes {
+        for k in 0..6 {
+            point[k] += node.count * place[k];
         }
+        for c in 0..3 {
+            log_value[c] += node.count * node.log_value[c];
+        }
+        count += node.count;
     }
-    nodes
+    (count > 0.0).then(|| Node {
+        point: point.map(|p| p / count),
+        log_value: log_value.map(|v| v / count),
+        count,
+        source: u32::MAX,
+    })
 }
 
 /// The smallest value per channel that takes part.

@@ -1,23 +1,25 @@
 //! The cells of a pair of patches: fitted as one coarse block, and cut into fine ones where that is
 //! not enough.
 //!
-//! The coarse block goes through merged nodes. Where its values change most, one fine block is
-//! fitted through the bins' own nodes; if the two agree on that block's cells within what the
-//! samples' noise explains, the coarse one stands. Else every part gets a block of its own, and
-//! these are blended.
+//! The coarse block goes through merged nodes. Where its values change most, its own variance is
+//! looked at; if that is more than what noise explains, one fine block is fitted there through the
+//! bins' own nodes; if the two differ by more than the tolerance, every part gets a block of its own,
+//! and these are blended.
 
 use super::Settings;
 use super::blend::{Shifts, difference, limit_of};
 use super::block::BlockSolver;
 use super::coordinates::Point;
-use super::levels::{Detail, Found, Levels, keep_nearest};
+use super::levels::{Detail, Found, Neighbours, keep_nearest};
 use super::patches::{Child, Patch};
 use crate::direction::{Vec3, dot};
 
 /// What a thread keeps from pair to pair.
 #[derive(Default)]
 pub struct Refiner {
-    solver: BlockSolver,
+    /// The block of the pair, and the one of a part.
+    whole: BlockSolver,
+    fine: BlockSolver,
     /// Merged nodes whose bins are looked at.
     near: Vec<Found>,
     found: Vec<Found>,
@@ -66,20 +68,48 @@ impl Count {
 
 impl Refiner {
     /// Interpolates the cells of a pair: see [`Self::logs`] and [`Self::variances`].
-    pub fn solve(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
-        if self.solve_whole(levels, settings, p, q) {
+    pub fn solve(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
+        self.fit_whole(levels, settings, p, q);
+        if self.is_to_be_cut(levels, settings, p, q) {
             self.solve_parts(levels, settings, p, q);
+            return;
+        }
+        write_places(settings, p, q, &mut self.places);
+        self.logs.clear();
+        self.whole.evaluate(&self.places, &mut self.logs);
+        if self.with_variances {
+            self.variances.clear();
+            self.whole.variances_at(&self.places, &mut self.variances);
         }
     }
 
+    /// By how many standard deviations of a sample a fine block differs from the coarse one of a pair
+    /// where that changes most; 0 where the coarse one is sure enough of itself.
+    pub fn doubt(
+        &mut self,
+        levels: &impl Neighbours,
+        settings: &Settings,
+        p: &Patch,
+        q: &Patch,
+    ) -> f32 {
+        self.fit_whole(levels, settings, p, q);
+        self.doubt_of_whole(levels, settings, p, q)
+    }
+
     /// All parts of a pair, each in a block of its own, and no seams between them.
-    fn solve_parts(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
+    fn solve_parts(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         let mut logs = std::mem::take(&mut self.logs);
+        let cells = p.directions.len() * q.directions.len();
+        logs.resize(cells, [0.0; 3]);
+        if self.with_variances {
+            self.variances.resize(cells, [0.0; 3]);
+        }
         self.part_corners.clear();
         self.parts_at.clear();
         self.parts_at.resize(self.corners.len(), 0);
         self.corners.fill([0.0; 3]);
         for (a, b) in pairs_of_parts(p, q) {
+            let first = self.part_corners.len();
             self.solve_part(levels, settings, a, b);
             for (k, place) in places_in(a, b, q).enumerate() {
                 logs[place] = self.part[k];
@@ -87,8 +117,6 @@ impl Refiner {
                     self.variances[place] = self.part_variances[k];
                 }
             }
-            let first = self.part_corners.len();
-            self.evaluate_corners(settings, &a.patch, &b.patch);
             for (k, corner) in corners_in(a, b, q).enumerate() {
                 self.parts_at[corner] += 1;
                 for c in 0..3 {
@@ -125,28 +153,57 @@ impl Refiner {
         self.logs = logs;
     }
 
-    /// The pair as one coarse block; whether it must be cut.
-    fn solve_whole(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) -> bool {
+    /// Whether the coarse block that was fitted last does not do.
+    fn is_to_be_cut(
+        &mut self,
+        levels: &impl Neighbours,
+        settings: &Settings,
+        p: &Patch,
+        q: &Patch,
+    ) -> bool {
         self.count.pairs += 1;
-        self.fit_whole(levels, settings, p, q);
-        let mut logs = std::mem::take(&mut self.logs);
-        self.evaluate(settings, p, q, &mut logs);
-        if self.with_variances {
-            self.variances.clear();
-            self.solver.variances_at(&self.places, &mut self.variances);
-        }
-        self.part_corners.clear();
-        self.evaluate_corners(settings, p, q);
-        std::mem::swap(&mut self.corners, &mut self.part_corners);
-        let mut cut = false;
-        if let Some((a, b)) = steepest(&logs, p, q).filter(|_| settings.cuts()) {
-            self.solve_part(levels, settings, a, b);
-            let limit = settings.tolerance * settings.noise_variance.sqrt().max(NOISE_MIN);
-            cut = self.rms_from(&logs, q, a, b) > limit;
-        }
+        let cut = settings.cuts()
+            && !p.children.is_empty()
+            && (settings.tolerance == 0.0
+                || self.doubt_of_whole(levels, settings, p, q) > settings.tolerance);
         self.count.cut += usize::from(cut);
-        self.logs = logs;
         cut
+    }
+
+    /// [`Self::doubt`] of the coarse block that was fitted last.
+    fn doubt_of_whole(
+        &mut self,
+        levels: &impl Neighbours,
+        settings: &Settings,
+        p: &Patch,
+        q: &Patch,
+    ) -> f32 {
+        let Some((a, b)) = steepest(&self.corners, p, q) else {
+            return 0.0;
+        };
+        self.places.clear();
+        for light in some_of(&a.patch.vectors) {
+            for view in some_of(&b.patch.vectors) {
+                self.places.push(settings.coordinates.point(*light, *view));
+            }
+        }
+        let noise = settings.noise_sigma();
+        self.part_variances.clear();
+        self.whole
+            .variances_at(&self.places, &mut self.part_variances);
+        let variance = self.part_variances.iter().flatten().sum::<f32>()
+            / (3 * self.part_variances.len()).max(1) as f32;
+        if variance < SURE * (settings.tolerance * noise).powi(2) {
+            return 0.0;
+        }
+        self.logs.clear();
+        self.whole.evaluate(&self.places, &mut self.logs);
+        self.fit_part(levels, settings, a.patch.centre, b.patch.centre);
+        self.part.clear();
+        self.fine.evaluate(&self.places, &mut self.part);
+        let pairs = self.logs.iter().flatten().zip(self.part.iter().flatten());
+        let squares: f32 = pairs.map(|(x, y)| (x - y).powi(2)).sum();
+        (squares / (3 * self.part.len()).max(1) as f32).sqrt() / noise
     }
 
     /// Natural logarithms of the cells of the last pair, light by light.
@@ -168,111 +225,117 @@ impl Refiner {
     /// [`Self::solve`] would give for a cell there.
     pub fn predict(
         &mut self,
-        levels: &Levels,
+        levels: &impl Neighbours,
         settings: &Settings,
         (p, q): (&Patch, &Patch),
         (light, view): (Vec3, Vec3),
     ) -> ([f32; 3], [f32; 3]) {
-        // Only where a pair may be cut must its cells be known.
-        let cut = settings.cuts() && self.solve_whole(levels, settings, p, q);
+        self.fit_whole(levels, settings, p, q);
+        let cut = self.is_to_be_cut(levels, settings, p, q);
         let nearest = |patch: &'_ Patch, direction: Vec3| {
             let along = |c: &Child| dot(c.patch.centre, direction);
             let parts = 0..patch.children.len();
             parts.max_by(|a, b| along(&patch.children[*a]).total_cmp(&along(&patch.children[*b])))
         };
-        match (nearest(p, light), nearest(q, view)) {
+        let block = match (nearest(p, light), nearest(q, view)) {
             (Some(a), Some(b)) if cut => {
                 let centre = (p.children[a].patch.centre, q.children[b].patch.centre);
                 self.fit_part(levels, settings, centre.0, centre.1);
+                &mut self.fine
             }
-            _ => self.fit_whole(levels, settings, p, q),
-        }
+            _ => &mut self.whole,
+        };
         let place = [settings.coordinates.point(light, view)];
         self.part.clear();
-        self.solver.evaluate(&place, &mut self.part);
+        block.evaluate(&place, &mut self.part);
         let log = self.part[0];
         self.part.clear();
-        self.solver.variances_at(&place, &mut self.part);
+        block.variances_at(&place, &mut self.part);
         (log, self.part[0])
     }
 
-    /// A coarse block, through merged nodes.
-    fn fit_whole(&mut self, levels: &Levels, settings: &Settings, p: &Patch, q: &Patch) {
+    /// A coarse block, through merged nodes, and what it gives at the corners.
+    fn fit_whole(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         let centre = settings.coordinates.point(p.centre, q.centre);
         levels.around(&centre, settings.nodes, &mut self.found);
-        self.fit(levels, settings, Detail::Merged, centre);
+        self.count.blocks += 1;
+        let (found, detail) = (&mut self.found, Detail::Merged);
+        fit(&mut self.whole, levels, settings, detail, centre, found);
+        write_corners(settings, p, q, &mut self.places);
+        self.corners.clear();
+        self.whole.evaluate(&self.places, &mut self.corners);
     }
 
     /// A fine block around a pair of directions, through the bins' own nodes.
-    fn fit_part(&mut self, levels: &Levels, settings: &Settings, light: Vec3, view: Vec3) {
+    fn fit_part(&mut self, levels: &impl Neighbours, settings: &Settings, light: Vec3, view: Vec3) {
         let centre = settings.coordinates.point(light, view);
         levels.around(&centre, settings.nodes / 2, &mut self.near);
         levels.expand(&centre, &self.near, &mut self.found);
-        self.fit(levels, settings, Detail::Bins, centre);
-    }
-
-    /// Fits the nearest of `found` around a place.
-    fn fit(&mut self, levels: &Levels, settings: &Settings, detail: Detail, centre: Point) {
         self.count.blocks += 1;
-        let radius = keep_nearest(&mut self.found, settings.nodes);
-        let nodes = levels.nodes(detail);
-        self.solver.fit(
-            self.found.iter().map(|(_, k)| &nodes[*k as usize]),
-            centre,
-            radius,
-            &settings.block(),
-        );
+        let (found, detail) = (&mut self.found, Detail::Bins);
+        fit(&mut self.fine, levels, settings, detail, centre, found);
     }
 
-    fn evaluate(&mut self, settings: &Settings, p: &Patch, q: &Patch, logs: &mut Vec<[f32; 3]>) {
-        self.places.clear();
-        for light in &p.vectors {
-            for view in &q.vectors {
-                self.places.push(settings.coordinates.point(*light, *view));
-            }
-        }
-        logs.clear();
-        self.solver.evaluate(&self.places, logs);
-    }
-
-    /// Appends what the block gives at the corners of a pair.
-    fn evaluate_corners(&mut self, settings: &Settings, p: &Patch, q: &Patch) {
-        self.places.clear();
-        for light in &p.corner_vectors {
-            for view in &q.corner_vectors {
-                self.places.push(settings.coordinates.point(*light, *view));
-            }
-        }
-        self.solver.evaluate(&self.places, &mut self.part_corners);
-    }
-
-    /// A pair of parts in a fine block.
-    fn solve_part(&mut self, levels: &Levels, settings: &Settings, a: &Child, b: &Child) {
+    /// A pair of parts in a fine block: its cells and, appended, its corners.
+    fn solve_part(&mut self, levels: &impl Neighbours, settings: &Settings, a: &Child, b: &Child) {
         self.fit_part(levels, settings, a.patch.centre, b.patch.centre);
-        let mut part = std::mem::take(&mut self.part);
-        self.evaluate(settings, &a.patch, &b.patch, &mut part);
-        self.part = part;
+        write_corners(settings, &a.patch, &b.patch, &mut self.places);
+        self.fine.evaluate(&self.places, &mut self.part_corners);
+        write_places(settings, &a.patch, &b.patch, &mut self.places);
+        self.part.clear();
+        self.fine.evaluate(&self.places, &mut self.part);
         if self.with_variances {
             self.part_variances.clear();
-            self.solver
+            self.fine
                 .variances_at(&self.places, &mut self.part_variances);
         }
     }
+}
 
-    /// RMS difference of the part from the whole.
-    fn rms_from(&self, logs: &[[f32; 3]], q: &Patch, a: &Child, b: &Child) -> f32 {
-        let mut sum = 0.0;
-        for (k, place) in places_in(a, b, q).enumerate() {
-            for c in 0..3 {
-                sum += (self.part[k][c] - logs[place][c]).powi(2);
-            }
+/// Fits a block to the nearest of `found` around a place.
+fn fit(
+    block: &mut BlockSolver,
+    levels: &impl Neighbours,
+    settings: &Settings,
+    detail: Detail,
+    centre: Point,
+    found: &mut Vec<Found>,
+) {
+    let radius = keep_nearest(found, settings.nodes);
+    let nodes = found.iter().map(|(_, k)| levels.node(detail, *k));
+    block.fit(nodes, centre, radius, &settings.block());
+}
+
+/// The cells of a pair of patches, light by light.
+fn write_places(settings: &Settings, p: &Patch, q: &Patch, places: &mut Vec<Point>) {
+    write_pairs(settings, &p.vectors, &q.vectors, places);
+}
+
+/// Their corners, corner by corner of the first.
+fn write_corners(settings: &Settings, p: &Patch, q: &Patch, places: &mut Vec<Point>) {
+    write_pairs(settings, &p.corner_vectors, &q.corner_vectors, places);
+}
+
+fn write_pairs(settings: &Settings, lights: &[Vec3], views: &[Vec3], places: &mut Vec<Point>) {
+    places.clear();
+    for light in lights {
+        for view in views {
+            places.push(settings.coordinates.point(*light, *view));
         }
-        (sum / (3 * self.part.len().max(1)) as f32).sqrt()
     }
 }
 
-/// Two fits through different nodes never agree better than this, whatever the samples' noise.
-pub(super) const NOISE_MIN: f32 = 0.003;
+/// Up to four of some directions, evenly spread.
+fn some_of(directions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
+    directions
+        .iter()
+        .step_by(directions.len().div_ceil(4).max(1))
+}
+
+/// A coarse block whose own variance is less than this share of what would be tolerated is not doubted:
+/// hardly any of those that must be cut are as sure of themselves, and asking all would cost as much
+/// again as the coarse blocks.
+const SURE: f32 = 0.1;
 
 /// Where the cells of a pair of parts stand among those of the whole.
 fn places_in(a: &Child, b: &Child, q: &Patch) -> impl Iterator<Item = usize> {
@@ -303,18 +366,22 @@ fn pairs_of_parts<'a>(
         .flat_map(|a| q.children.iter().map(move |b| (a, b)))
 }
 
-/// The pair of parts over which the values change most; `None` where there are no parts.
-fn steepest<'a>(logs: &[[f32; 3]], p: &'a Patch, q: &'a Patch) -> Option<(&'a Child, &'a Child)> {
+/// The pair of parts between whose corners the values change most; `None` where there are no parts.
+fn steepest<'a>(
+    corners: &[[f32; 3]],
+    p: &'a Patch,
+    q: &'a Patch,
+) -> Option<(&'a Child, &'a Child)> {
     let mut best = None;
     let mut steepest = f32::NEG_INFINITY;
     for a in &p.children {
         for b in &q.children {
             let mut low = [f32::INFINITY; 3];
             let mut high = [f32::NEG_INFINITY; 3];
-            for place in places_in(a, b, q) {
+            for corner in corners_in(a, b, q) {
                 for c in 0..3 {
-                    low[c] = low[c].min(logs[place][c]);
-                    high[c] = high[c].max(logs[place][c]);
+                    low[c] = low[c].min(corners[corner][c]);
+                    high[c] = high[c].max(corners[corner][c]);
                 }
             }
             let change: f32 = (0..3).map(|c| high[c] - low[c]).sum();

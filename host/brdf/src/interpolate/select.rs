@@ -1,10 +1,13 @@
-//! Which settings suit a material: cross-validation over held-out frames.
+//! Which settings suit a material: coordinates by cross-validation over held-out frames, the
+//! tolerance by what cutting may cost.
 
 use super::Settings;
+use super::budget::affordable_tolerance;
 use super::coordinates::Coordinates;
 use super::hold_out::{HoldOut, Prediction};
+use super::known::Known;
 use super::nodes::log_noise_variance;
-use crate::bins::Bins;
+use super::patches::cover;
 
 /// Held-out bins that are predicted, at most, over all sets.
 const TESTS: usize = 1200;
@@ -19,14 +22,18 @@ const CANDIDATES: [Coordinates; 4] = [
 ];
 
 /// A ratio of errors that so few tests cannot tell from 1.
-const TIE: f64 = 1.03;
+const TIE: f64 = 1.05;
+/// Only where both elevations are below this do held-out frames have others all around them; beyond, it
+/// is extrapolation that would be judged. Degrees.
+const INTERIOR_DEG: f64 = 75.0;
 
 /// One candidate and how it did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The settings tried.
     pub settings: Settings,
-    /// RMS of the natural logarithm of predicted over measured, the samples' noise included.
+    /// RMS of the natural logarithm of predicted over measured in the interior, half of it bright bins, the
+    /// samples' noise included.
     pub log_rms: f64,
 }
 
@@ -41,8 +48,9 @@ pub struct Selection {
 
 /// Estimates the noise from the spread inside bins, then tries the candidate coordinates on frames
 /// (or, without frame numbers, clusters of directions) held out. With too few of them, `base` keeps
-/// its coordinates.
-pub fn select(bins: &Bins, base: Settings) -> Selection {
+/// its coordinates. The tolerance is raised where cutting would cost more than the budget.
+pub fn select(known: &Known, base: Settings) -> Selection {
+    let bins = known.bins();
     let mut settings = base;
     if let Some(variance) = log_noise_variance(bins.bins().iter()) {
         settings.noise_variance = variance;
@@ -55,11 +63,11 @@ pub fn select(bins: &Bins, base: Settings) -> Selection {
     });
     let mut squares = CANDIDATES.map(|_| Vec::new());
     for set in 0..sets {
-        let Some(held_out) = HoldOut::new(bins, CANDIDATES[0], set, HOLD_OUT, tests) else {
+        let Some(held_out) = HoldOut::new(known, set, HOLD_OUT, tests) else {
             continue;
         };
         for (candidate, squares) in candidates.iter().zip(&mut squares) {
-            squares.extend(held_out.predict(candidate).iter().map(weighted_square));
+            squares.extend(held_out.predict(candidate).iter().filter_map(square));
         }
     }
     let trials: Vec<Trial> = candidates
@@ -78,22 +86,30 @@ pub fn select(bins: &Bins, base: Settings) -> Selection {
     if let Some(chosen) = trials.iter().find(|t| t.log_rms <= TIE * best) {
         settings = chosen.settings;
     }
+    let cover = cover(bins.grid(), &settings.patch_sizes_deg());
+    let sorted = known.sorted_for(settings.coordinates);
+    let nodes = sorted
+        .as_ref()
+        .unwrap_or(known)
+        .part(settings.coordinates, |_| true);
+    settings.tolerance = affordable_tolerance(&nodes, &cover, &settings);
     Selection { settings, trials }
 }
 
 /// A residual beyond this is no better known: an outlier must not decide.
 const RESIDUAL_MAX: f32 = 1.0;
 
-/// Weight and mean square residual of a prediction.
-fn weighted_square(prediction: &Prediction) -> (f64, f64) {
+/// Mean square residual of a prediction in the interior. The brightest tenth of the bins are half of the
+/// tests, and count as much: weighed by their number, highlights would not count at all on a plan so
+/// sparse that few frames see them.
+fn square(prediction: &Prediction) -> Option<f64> {
+    let lowest = prediction.bin.light[2].min(prediction.bin.view[2]);
     let squares = (0..3)
         .filter_map(|c| prediction.residual(c))
         .map(|r| f64::from(r.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)).powi(2));
-    (f64::from(prediction.weight), squares.sum::<f64>() / 3.0)
+    (f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()).then(|| squares.sum::<f64>() / 3.0)
 }
 
-fn rms(squares: &[(f64, f64)]) -> f64 {
-    let sum: f64 = squares.iter().map(|(weight, square)| weight * square).sum();
-    let weights: f64 = squares.iter().map(|(weight, _)| weight).sum();
-    (sum / weights).sqrt()
+fn rms(squares: &[f64]) -> f64 {
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }

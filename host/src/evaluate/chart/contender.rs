@@ -4,7 +4,7 @@ use super::cpu::cpu_seconds;
 use gonia_brdf::cellwise::{
     CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
 };
-use gonia_brdf::interpolate::{self, FillError, Preset, Settings};
+use gonia_brdf::interpolate::{self, FillError, Known, Preset, Settings};
 use gonia_brdf::{Bins, Grid};
 use rayon::prelude::*;
 use std::fmt;
@@ -204,8 +204,9 @@ fn run_cellwise(
 
 fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
     let start = cpu_seconds();
-    let settings = interpolate::select(bins, *base).settings;
-    let dense = interpolate::fill(bins, &settings, &|_| ())?;
+    let known = Known::new(bins);
+    let settings = interpolate::select(&known, *base).settings;
+    let dense = interpolate::fill(&known, &settings, &|_| ())?;
     let core_s = cpu_seconds() - start;
     let at = |(light, view): &(u32, u32)| dense.at(*light as usize, *view as usize);
     Ok(Run {
