@@ -113,13 +113,15 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
     write_frame(&path("odd.exr"), &odd).unwrap();
     std::fs::write(path("x.bin"), "short").unwrap();
     std::fs::write(path("x.dat"), "short").unwrap();
+    std::fs::write(path("x.txt"), "short").unwrap();
     let (dense, out) = (path("d.exr"), path("out.png"));
     let (dense, out) = (text(&dense), text(&out));
     let unknown = gonia(&["fit", dense, "--model", "phong"], "");
     assert_eq!(unknown.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("kurt1 to kurt4"));
     let (odd, bin, dat) = (path("odd.exr"), path("x.bin"), path("x.dat"));
-    let cases: [(&[&str], &str); 7] = [
+    let (txt, samples) = (path("x.txt"), path("s.npy"));
+    let cases: [(&[&str], &str); 10] = [
         (&["fit", text(&odd), "--model", "ggx"], "7 × 5 pixels"),
         (
             &["fit", dense, "--model", "ggx", "--cells", "3"],
@@ -131,11 +133,20 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
         ),
         (&["render", dense, "-o", out, "--px", "0"], "--px 0"),
         (
+            &["render", dense, "-o", out, "--light", text(&odd)],
+            "twice as wide as high",
+        ),
+        (
             &["photo", dense, text(&odd), "-o", out, "--box", "0,0,90,90"],
             "7 × 5 pixels",
         ),
         (&["import", text(&bin), "-o", out], "holds 5 bytes"),
-        (&["import", text(&dat), "-o", out], "neither .bin"),
+        (&["import", text(&txt), "-o", out], "neither .bin"),
+        (&["import", text(&dat), "-o", out], "name it .npy or .csv"),
+        (
+            &["import", text(&dat), "-o", text(&samples)],
+            "holds 5 bytes",
+        ),
     ];
     for (arguments, word) in cases {
         let said = refused(arguments);
@@ -242,24 +253,36 @@ fn rivals_are_made_judged_and_shown_in_the_report() {
     let path = |name: &str| dir.path().join(name);
     let model = Kurt::white_reference_fabric();
     write_samples(&path("samples.npy"), &session(&model)).unwrap();
-    write(&path("dense.exr"), 15.0, &model, Scale::Relative);
-    write(&path("truth.exr"), 15.0, &model, Scale::Absolute);
-    let printed = gonia_ok(
-        &[
+    write(&path("dense.exr"), 7.5, &model, Scale::Relative);
+    write(&path("truth.exr"), 7.5, &model, Scale::Absolute);
+    let said = refused(&["rivals", text(dir.path()), "--step", "10"]);
+    assert!(
+        said.contains("a multiple of dense.exr's 7.5 degrees"),
+        "{said}"
+    );
+    let made = |more: &[&str]| {
+        let arguments = [
             "rivals",
             text(dir.path()),
-            "--without-paper",
             "--cells",
             "1000",
             "--starts",
             "4",
-        ],
-        "",
-    );
+        ];
+        gonia_ok(&[&arguments[..], more].concat(), "");
+        Rivals::read(&path("rivals.toml")).unwrap()
+    };
+    // The paper's method takes a second for a thousand cells.
+    let found = made(&["--step", "30"]);
+    for row in &found.rows[1..] {
+        let table = read_dense(&path(&format!("{}.exr", row.name))).unwrap();
+        assert_eq!(table.brdf.grid().step_deg(), 30.0, "{}", row.name);
+    }
+    assert!(found.rows.iter().any(|row| row.name == "sparse-paper"));
+    let found = made(&["--step", "15", "--without-paper"]);
     let names = ["dense", "sparse", "strips", "kurt2", "sadeghi"];
-    let found = Rivals::read(&path("rivals.toml")).unwrap();
     let rows: Vec<&str> = found.rows.iter().map(|row| row.name.as_str()).collect();
-    assert_eq!(rows, names, "{printed}");
+    assert_eq!(rows, names);
     let error = |name: &str| {
         let row = found.rows.iter().find(|row| row.name == name).unwrap();
         let figures = row.against_truth.as_ref().unwrap();

@@ -13,6 +13,7 @@ pub mod hemisphere;
 pub mod interpolate;
 pub mod model;
 pub mod sample;
+pub mod shading;
 
 pub use bins::{Bin, Bins};
 pub use dense::DenseBrdf;

@@ -70,9 +70,9 @@ impl Chart {
         if !(100..=1_000_000).contains(&self.tests) {
             bail!("--tests {}: must lie in 100..=1000000", self.tests);
         }
-        check_writable(&self.out)?;
         let mut progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(path))?;
+        check_writable(&self.out)?;
         let (samples, judge) = self
             .judge(samples, grid, &mut progress)
             .with_context(|| path.display().to_string())?;

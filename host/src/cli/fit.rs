@@ -5,25 +5,29 @@ use super::provenance::of_this_program;
 use super::table;
 use crate::dataset::dense_exr::{read_dense, write_dense};
 use crate::dataset::fit_toml::{FitNote, FittedNumber};
+use crate::dataset::samples::read_samples;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use crate::evaluate::compare::Table;
 use crate::evaluate::{self, Figures, Options, Side};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::DenseBrdf;
-use gonia_brdf::fit::{self, Family, Loss, Settings};
+use gonia_brdf::fit::{self, Cell, Family, Loss, Settings};
+use gonia_brdf::{Bins, DenseBrdf};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Fits a model to a dense BRDF by Levenberg and Marquardt's method from many random starts, all
-/// channels at once, and prints its numbers with their standard uncertainties (as if residuals were
-/// independent: where the model is wrong they are too small) and its error by stratum.
+/// channels at once, and prints its numbers with their standard uncertainties (from how much the
+/// residuals vary together over patches of 30 degrees) and its error by stratum.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fit dense.exr --model sadeghi -o sadeghi.exr\n\nMODEL is lambert, ward, ggx, kurt1 to kurt4 (that many lobes, each with its azimuth), or sadeghi:\nthe microcylinder model of two threads, each with two tangents tilted by ±tilt, its reciprocal\nmean. Beside FIT.exr stands FIT.fit.toml, which `gonia report` of that folder shows."
+    after_long_help = "Example:\n  gonia fit dense.exr --model sadeghi -o sadeghi.exr\n  gonia fit dense.exr --samples samples.npy --model kurt2\n\nMODEL is lambert, ward, ggx, kurt1 to kurt4 (that many lobes, each with its azimuth), or sadeghi:\nthe microcylinder model of two threads, each with two tangents tilted by ±tilt, its reciprocal\nmean. Beside FIT.exr stands FIT.fit.toml, which `gonia report` of that folder shows.\n\nWith --samples the model is fitted to their bins. Uncertainties of a fit to the table alone do not\nhold what interpolation does to it: where it smooths a highlight, a lobe is as much too wide."
 )]
 pub struct Fit {
     /// The dense BRDF
     dense: PathBuf,
+    /// The samples behind it, .npy or .csv: fit to what was measured, not to what was interpolated
+    #[arg(long, value_name = "SAMPLES")]
+    samples: Option<PathBuf>,
     /// Which model to fit
     #[arg(long, value_name = "MODEL")]
     model: Family,
@@ -95,7 +99,29 @@ impl Fit {
         let mut progress = Progress::new();
         let measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
         let name = self.dense.display().to_string();
-        let result = fit_model(&measured, &name, self.model, &settings, &mut progress)?;
+        let cells = match &self.samples {
+            None => fit::draw(&measured.brdf, settings.cells, settings.seed),
+            Some(path) => {
+                let samples = progress.stage("reading samples", |_| read_samples(path))?;
+                let bins = Bins::new(measured.brdf.grid(), &samples);
+                let cells = fit::draw_measured(&bins, settings.cells, settings.seed);
+                if cells.is_empty() {
+                    bail!(
+                        "{}: no sample lies on the grid; give those of {name}",
+                        path.display()
+                    );
+                }
+                cells
+            }
+        };
+        let result = fit_model(
+            &measured,
+            &name,
+            &cells,
+            self.model,
+            &settings,
+            &mut progress,
+        )?;
         print_note(&result.note);
         let converged = result.note.converged;
         if let Some(path) = &self.output {
@@ -118,10 +144,11 @@ impl Fit {
     }
 }
 
-/// Fits a family to a table, and compares the two.
+/// Fits a family to cells of a table, or to the bins behind it, and compares it with the table.
 pub fn fit_model(
     measured: &DenseFile,
     name: &str,
+    cells: &[Cell],
     family: Family,
     settings: &Settings,
     progress: &mut Progress,
@@ -130,7 +157,7 @@ pub fn fit_model(
     let start = Instant::now();
     let fit = progress
         .stage(&format!("fitting {family}"), |tell| {
-            fit::fit(&measured.brdf, family, settings, tell)
+            fit::fit(cells, family, settings, tell)
         })
         .with_context(|| name.to_owned())?;
     let seconds = start.elapsed().as_secs_f64();

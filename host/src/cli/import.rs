@@ -1,9 +1,12 @@
-//! `gonia import`: other people's measurements as a dense BRDF.
+//! `gonia import`: other people's measurements.
 
 use super::progress::Progress;
 use super::provenance::of_this_program;
+use super::table::count;
 use crate::dataset::dense_exr::write_dense;
 use crate::dataset::merl::read_merl;
+use crate::dataset::ngan::read_ngan;
+use crate::dataset::samples::{check_sample_name, write_samples};
 use crate::dataset::utia::read_utia;
 use crate::dataset::{DenseFile, Scale};
 use anyhow::{Context, Result, bail};
@@ -11,15 +14,16 @@ use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use std::path::PathBuf;
 
 /// Brings a material of the UTIA database (.bin, anisotropic) or of MERL (.binary, isotropic) onto
-/// gonia's grid, so that every other command can judge, fit and draw it.
+/// gonia's grid, so that every other command can judge, fit and draw it; one of Ngan, Durand and
+/// Matusik (.dat, anisotropic), which is full of holes, becomes samples for `gonia fill`.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
+    after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n  gonia import velvet.dat -o velvet.npy && gonia fill velvet.npy -o velvet.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
 )]
 pub struct Import {
-    /// The material, .bin or .binary
+    /// The material, .bin, .binary or .dat
     material: PathBuf,
-    /// The dense BRDF to write (OpenEXR)
+    /// The dense BRDF to write (OpenEXR), or for .dat the samples (.npy or .csv)
     #[arg(short, long, value_name = "DENSE.exr")]
     output: PathBuf,
     /// Step of the grid in degrees
@@ -36,6 +40,9 @@ impl Import {
             .extension()
             .unwrap_or_default()
             .to_string_lossy();
+        if extension == "dat" {
+            return self.import_samples();
+        }
         let (model, format, scale): (Box<dyn Brdf>, _, _) = match extension.as_ref() {
             "bin" => (
                 Box::new(read_utia(&self.material)?),
@@ -48,7 +55,7 @@ impl Import {
                 Scale::Absolute,
             ),
             _ => bail!(
-                "{}: neither .bin (UTIA) nor .binary (MERL); give other samples to gonia fill as CSV",
+                "{}: neither .bin (UTIA), .binary (MERL) nor .dat (Ngan, Durand, Matusik); give other samples to gonia fill as CSV",
                 self.material.display()
             ),
         };
@@ -69,6 +76,18 @@ impl Import {
                 provenance,
             },
         )?;
+        Ok(())
+    }
+    fn import_samples(&self) -> Result<()> {
+        check_sample_name(&self.output)?;
+        let mut progress = Progress::new();
+        let samples = progress.stage("reading the bins", |_| read_ngan(&self.material))?;
+        write_samples(&self.output, &samples)?;
+        println!(
+            "{} bins hold a measurement; gonia fill {} makes them dense",
+            count(samples.len() as u64),
+            self.output.display()
+        );
         Ok(())
     }
 }

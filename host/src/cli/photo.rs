@@ -1,11 +1,13 @@
 //! `gonia photo`: a photograph of the material beside its render.
 
+use super::fill::folder_of;
 use super::progress::Progress;
 use super::table;
-use crate::dataset::Frame;
+
 use crate::dataset::dense_exr::read_dense;
 use crate::dataset::photo::read_photo;
 use crate::dataset::whole_file::write_whole_bytes;
+use crate::dataset::{Frame, check_writable};
 use crate::evaluate::Tabulated;
 use crate::evaluate::color::{delta_e, luminance};
 use crate::evaluate::render::{self, Picture};
@@ -93,6 +95,7 @@ impl Photo {
         {
             bail!("--light-up must lie in -89..=89 degrees, --light-right in -180..=180");
         }
+        check_writable(folder_of(&self.output))?;
         let mut progress = Progress::new();
         let photo = read_photo(&self.photo)?;
         let outline = self.outline.unwrap_or(Outline {

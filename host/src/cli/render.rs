@@ -1,11 +1,12 @@
 //! `gonia render`: what a material looks like.
 
+use super::fill::folder_of;
 use super::progress::Progress;
-use crate::dataset::Frame;
 use crate::dataset::dense_exr::read_dense;
 use crate::dataset::frame_exr::{Precision, write_frame_as};
 use crate::dataset::photo::read_photo;
 use crate::dataset::whole_file::write_whole_bytes;
+use crate::dataset::{Frame, check_writable};
 use crate::evaluate::Tabulated;
 use crate::evaluate::render::{self, Environment, Light, Picture};
 use crate::report::{png, tone};
@@ -67,6 +68,12 @@ impl Render {
         if !(-20.0..=20.0).contains(&self.exposure) {
             bail!("--exposure {}: must lie in -20..=20 stops", self.exposure);
         }
+        for path in [Some(&self.output), self.linear.as_ref()]
+            .into_iter()
+            .flatten()
+        {
+            check_writable(folder_of(path))?;
+        }
         let lights = lights_of(&self.light, self.lights)?;
         let mut progress = Progress::new();
         let file = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
@@ -99,6 +106,11 @@ pub fn lights_of(name: &str, most: usize) -> Result<Vec<Light>> {
         "studio" => render::studio(),
         path if path.ends_with(".exr") => {
             let Frame { width, height, rgb } = read_photo(Path::new(path))?;
+            if width != 2 * height {
+                bail!(
+                    "--light {path}: has {width} × {height} pixels; give a latitude-longitude map, twice as wide as high"
+                );
+            }
             Environment::new(width, height, rgb)
                 .with_context(|| format!("{path}: nothing in it shines"))?
                 .lights(most)

@@ -16,7 +16,7 @@ use crate::report::folder::{DENSE, RIVALS, TRUTH};
 use crate::report::rivals::{Row, draw_row, figure};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::CellSettings;
-use gonia_brdf::fit::{Family, Settings as FitSettings};
+use gonia_brdf::fit::{Family, Settings as FitSettings, draw};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -27,11 +27,14 @@ use std::time::Instant;
 /// around a cylinder, Kurt's model of two lobes and the microcylinder model.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr."
+    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr (those\nof the paper's method on a grid of 10 to 30 degrees).\n\n--step 4 makes and judges them on a grid of 4 degrees, for a tenth of the time and of the disk; the paper's\nmethod has the bins of the session's own grid in any case."
 )]
 pub struct Rivals {
     /// The folder of a measurement
     folder: PathBuf,
+    /// Step of the rivals' grid in degrees, a multiple of the session's
+    #[arg(long, value_name = "DEG")]
+    step: Option<f64>,
     /// Leave out the paper's interpolation, the slowest
     #[arg(long)]
     without_paper: bool,
@@ -47,10 +50,28 @@ pub struct Rivals {
 struct Session {
     dense: DenseFile,
     truth: Option<DenseFile>,
+    /// Of the rivals, and of both here.
     grid: Grid,
+    /// Of the session as it was stored.
+    own_grid: Grid,
 }
 
 impl Rivals {
+    /// The grid that rivals are made on.
+    fn grid(&self, own: Grid) -> Result<Grid> {
+        let Some(step) = self.step else {
+            return Ok(own);
+        };
+        let grid = Grid::with_step_deg(step).context("--step")?;
+        if (step / own.step_deg()).fract() != 0.0 {
+            bail!(
+                "--step {step}: must be a multiple of {DENSE}'s {} degrees",
+                own.step_deg()
+            );
+        }
+        Ok(grid)
+    }
+
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let path = |name: &str| self.folder.join(name);
@@ -65,8 +86,29 @@ impl Rivals {
             true => Some(read_dense(&path(TRUTH))?),
             false => None,
         };
-        let grid = dense.brdf.grid();
-        let session = Session { dense, truth, grid };
+        let own_grid = dense.brdf.grid();
+        let grid = self.grid(own_grid)?;
+        let thinned = |file: DenseFile| DenseFile {
+            brdf: match grid == own_grid {
+                true => file.brdf,
+                false => coarse(&file.brdf, grid),
+            },
+            ..file
+        };
+        if let Some(truth) = &truth
+            && truth.brdf.grid() != own_grid
+        {
+            bail!(
+                "{}: is of another grid than {DENSE}; draw it again, or take it away",
+                path(TRUTH).display()
+            );
+        }
+        let session = Session {
+            dense: thinned(dense),
+            truth: truth.map(thinned),
+            grid,
+            own_grid,
+        };
         let central = centres(&samples);
         if central.len() < 50 {
             bail!(
@@ -87,16 +129,19 @@ impl Rivals {
         });
         let mut rows: Vec<Row> = vec![draw_row("dense", &session.dense.brdf)];
         if !self.without_paper {
-            let found = session.paper(&samples, "paper", &mut progress)?;
+            let (found, table) = session.paper(&samples, "paper", &mut progress)?;
             comparison.rows.push(found);
+            session.write(path("paper.exr"), table, "the paper's method")?;
         }
         drop(samples);
 
         let what = "one sample a frame, gonia's interpolation";
         let numbers = central.len() as u64;
         if !self.without_paper {
-            let found = session.paper(&central, "sparse-paper", &mut progress)?;
+            let (found, table) = session.paper(&central, "sparse-paper", &mut progress)?;
             comparison.rows.push(found);
+            let what = "the paper's method on central samples only";
+            session.write(path("sparse-paper.exr"), table, what)?;
         }
         let (rival, sparse) = session.filled(central, "sparse", what, &mut progress)?;
         comparison.rows.push(Rival { numbers, ..rival });
@@ -118,7 +163,15 @@ impl Rivals {
                 starts: self.starts,
                 ..FitSettings::default()
             };
-            let result = fit_model(&session.dense, DENSE, family, &settings, &mut progress)?;
+            let cells = draw(&session.dense.brdf, settings.cells, settings.seed);
+            let result = fit_model(
+                &session.dense,
+                DENSE,
+                &cells,
+                family,
+                &settings,
+                &mut progress,
+            )?;
             let note = &result.note;
             comparison.rows.push(Rival {
                 name: note.model.clone(),
@@ -146,7 +199,12 @@ impl Rivals {
 
 impl Session {
     /// The paper's interpolation of some samples, at the check cells.
-    fn paper(&self, samples: &[Sample], name: &str, progress: &mut Progress) -> Result<Rival> {
+    fn paper(
+        &self,
+        samples: &[Sample],
+        name: &str,
+        progress: &mut Progress,
+    ) -> Result<(Rival, DenseBrdf)> {
         let grid = check_grid(self.grid).with_context(|| {
             format!(
                 "{DENSE}: steps of {} degrees have no coarser grid to check; use --without-paper",
@@ -155,10 +213,11 @@ impl Session {
         })?;
         let start = Instant::now();
         let table = progress.stage(&format!("{name}, {} degrees", grid.step_deg()), |_| {
-            fill_check_cells(&Bins::new(self.grid, samples), &CellSettings::PAPER, grid)
+            let bins = Bins::new(self.own_grid, samples);
+            fill_check_cells(&bins, &CellSettings::PAPER, grid)
         })?;
         // As if all cells took as long.
-        let share = distinct(self.grid) / distinct(grid);
+        let share = distinct(self.own_grid) / distinct(grid);
         let seconds = start.elapsed().as_secs_f64() * share;
         let other = coarse(&self.dense.brdf, grid);
         let truth = self.truth.as_ref().map(|truth| coarse(&truth.brdf, grid));
@@ -169,7 +228,11 @@ impl Session {
             )?),
             None => None,
         };
-        Ok(Rival {
+        let against_dense = figures(
+            (&table, name, Scale::Absolute),
+            (&other, "dense", Scale::Absolute),
+        )?;
+        let rival = Rival {
             name: name.to_owned(),
             what: format!(
                 "the paper's method, at steps of {}°; time for all cells extrapolated",
@@ -177,13 +240,11 @@ impl Session {
             ),
             numbers: samples.len() as u64,
             seconds,
-            against_dense: Some(figures(
-                (&table, name, Scale::Absolute),
-                (&other, "dense", Scale::Absolute),
-            )?),
+            against_dense: Some(against_dense),
             against_truth,
             is_partial: true,
-        })
+        };
+        Ok((rival, table))
     }
 
     /// Samples interpolated by gonia's own method.

@@ -19,6 +19,7 @@ pub mod frame_exr;
 pub mod frames_csv;
 pub mod masks_csv;
 pub mod merl;
+pub mod ngan;
 mod npy;
 pub mod photo;
 pub mod plan_csv;

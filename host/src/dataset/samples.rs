@@ -76,6 +76,14 @@ pub fn write_samples(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
     }
 }
 
+/// Whether samples can be written under this name, before they are made.
+///
+/// # Errors
+/// Another extension.
+pub fn check_sample_name(path: &Path) -> Result<(), FileError> {
+    format_of(path).map(|_| ())
+}
+
 enum Format {
     Npy,
     Csv,

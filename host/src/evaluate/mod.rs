@@ -12,6 +12,7 @@ pub mod figures;
 pub mod motion;
 pub mod render;
 pub mod rivals;
+mod shade;
 pub mod stratum;
 pub mod tabulated;
 

@@ -1,7 +1,9 @@
 //! A table as a BRDF of any two directions.
 
+use super::shade::{Rows, shade};
 use gonia_brdf::direction::Vec3;
-use gonia_brdf::{Brdf, DenseBrdf, Direction, Grid};
+use gonia_brdf::shading::{Frame, Light};
+use gonia_brdf::{Brdf, DenseBrdf, Direction};
 
 /// A dense BRDF looked up between its nodes, times a factor.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +15,8 @@ pub struct Tabulated<'a> {
 
 /// About how many cells reciprocity is looked at.
 const PROBES: usize = 1000;
+/// Differences below this share are rounding, as in the table of a reciprocal model.
+const ROUNDING: f32 = 1e-5;
 
 impl<'a> Tabulated<'a> {
     /// The table as it is.
@@ -27,7 +31,8 @@ impl<'a> Tabulated<'a> {
         let stride = (grid.n_cells() / PROBES) | 1;
         let is_reciprocal = (0..grid.n_cells()).step_by(stride).all(|cell| {
             let (light, view) = grid.light_and_view(cell);
-            dense.at(light, view) == dense.at(view, light)
+            let (there, back) = (dense.at(light, view), dense.at(view, light));
+            (0..3).all(|c| (there[c] - back[c]).abs() <= ROUNDING * there[c].abs())
         });
         Self {
             dense,
@@ -44,71 +49,24 @@ impl Brdf for Tabulated<'_> {
             .map(|value| self.factor * f64::from(value))
     }
 
-    /// What pictures are made of: hundreds of lights a point. Of a reciprocal table the view is taken
-    /// as the row, so that all of a point's values are near each other in memory.
-    fn radiance(&self, lights: &[(Vec3, [f64; 3])], view: Vec3) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        if !self.is_reciprocal {
-            for (light, irradiance) in lights {
-                let f = self.eval(*light, view);
-                for c in 0..3 {
-                    sum[c] += f[c] * irradiance[c];
-                }
-            }
-            return sum;
-        }
-        let grid = self.dense.grid();
-        let n = grid.n_directions();
-        let rows = grid
-            .corners(Direction::from_vec3(view))
-            .map(|(row, weight)| {
-                let planes = self.dense.planes();
-                let cells = row * n..(row + 1) * n;
-                let row = [0, 1, 2].map(|c| &planes[c][cells.clone()]);
-                (row, weight as f32)
-            });
-        for (light, irradiance) in lights {
-            let mut f = [0.0f32; 3];
-            for (column, weight) in corners(grid, *light) {
-                for (row, share) in &rows {
-                    let weight = weight * share;
-                    for c in 0..3 {
-                        f[c] += weight * row[c][column];
-                    }
-                }
-            }
-            for c in 0..3 {
-                sum[c] += f64::from(f[c]) * irradiance[c];
-            }
-        }
-        sum.map(|v| self.factor * v)
+    /// What pictures are made of. Of a reciprocal table the view is taken as the row, so that all of a
+    /// point's values are near each other in memory.
+    fn shade(&self, points: &[Frame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
+        let rows = if self.is_reciprocal {
+            Rows::View
+        } else {
+            Rows::Light
+        };
+        let factor = self.factor as f32;
+        shade(self.dense, rows, factor, points, lights, viewer)
     }
-}
-
-/// [`Grid::corners`] of a unit vector in single precision, which is a third of the time.
-fn corners(grid: Grid, v: Vec3) -> [(usize, f32); 4] {
-    let [x, y, z] = v.map(|v| v as f32);
-    let (step, n_phi) = (grid.step_deg() as f32, grid.n_phi());
-    let last = (grid.n_theta() - 1) as f32;
-    let t = (z.clamp(-1.0, 1.0).acos().to_degrees() / step).min(last);
-    let p = y.atan2(x).to_degrees() / step;
-    let p = if p < 0.0 { p + n_phi as f32 } else { p };
-    let (t0, p0) = (t as usize, p as usize % n_phi);
-    let t1 = (t0 + 1).min(grid.n_theta() - 1);
-    let p1 = (p0 + 1) % n_phi;
-    let (ft, fp) = (t.fract(), p.fract());
-    [
-        (t0 * n_phi + p0, (1.0 - ft) * (1.0 - fp)),
-        (t0 * n_phi + p1, (1.0 - ft) * fp),
-        (t1 * n_phi + p0, ft * (1.0 - fp)),
-        (t1 * n_phi + p1, ft * fp),
-    ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_brdf::model::Kurt;
+    use gonia_brdf::Grid;
+    use gonia_brdf::shading::shade_one_by_one;
 
     #[test]
     fn light_and_view_are_told_apart_where_it_matters() {
@@ -127,30 +85,54 @@ mod tests {
         assert!((Tabulated::new(&even).eval(at(14), at(27))[0] - 41.0).abs() < 1e-3);
     }
 
+    /// A table with noise between neighbours, so that a wrong node shows; not reciprocal.
+    fn rough(grid: Grid) -> DenseBrdf {
+        let n = grid.n_directions();
+        let value = |i: usize, v: usize, c: usize| 1.0 + ((i * 7 + v * 13 + c) % 11) as f32 / 11.0;
+        DenseBrdf::from_fn(grid, |i, v| {
+            // A pole is one direction.
+            let [i, v] = [i, v].map(|node| if node < n / grid.n_theta() { 0 } else { node });
+            [0, 1, 2].map(|c| value(i, v, c))
+        })
+    }
+
     #[test]
-    fn many_lights_at_once_are_the_sum_of_each() {
+    fn points_shaded_together_are_those_shaded_one_by_one() {
         let grid = Grid::with_step_deg(6.0).unwrap();
-        let fabric = Kurt::two_thread_fabric();
-        let dense = DenseBrdf::tabulate(grid, &fabric);
-        // The model's own rounding makes its table reciprocal only nearly.
-        let mirrored = DenseBrdf::from_fn(grid, |i, v| dense.at(i.min(v), i.max(v)));
-        let table = Tabulated::scaled(&mirrored, 1.5);
-        assert!(table.is_reciprocal);
-        let at = |t, p| Direction::from_deg(t, p).to_vec3();
-        let view = at(37.0, 203.0);
-        let lights: Vec<(Vec3, [f64; 3])> = (0..50)
+        let skewed = rough(grid);
+        let even = DenseBrdf::from_fn(grid, |i, v| skewed.at(i.min(v), i.max(v)));
+        let at = |t: f64, p: f64| Direction::from_deg(t, p).to_vec3();
+        let points: Vec<Frame> = (0..300)
             .map(|k| {
-                (
-                    at(f64::from(k) * 1.79, f64::from(k) * 77.7),
-                    [1.0, 0.5, 2.0],
-                )
+                let (t, p) = (f64::from(k % 60) * 1.7, f64::from(k) * 77.7);
+                // A frame turned by p about its normal, which leans by t towards x.
+                let (lean, across) = (t.to_radians().sin_cos(), p.to_radians().sin_cos());
+                let down = [lean.1, 0.0, -lean.0];
+                let mix = |a: f64, b: f64| [a * down[0], b, a * down[2]];
+                Frame {
+                    tangent: mix(across.1, across.0),
+                    bitangent: mix(-across.0, across.1),
+                    normal: [lean.0, 0.0, lean.1],
+                }
             })
             .collect();
-        let together = table.radiance(&lights, view);
-        for c in 0..3 {
-            let each = lights.iter().map(|(l, e)| table.eval(*l, view)[c] * e[c]);
-            let sum: f64 = each.sum();
-            assert!((together[c] / sum - 1.0).abs() < 1e-4, "{together:?} {sum}");
+        let lights: Vec<Light> = (0..50)
+            .map(|k| Light {
+                towards: at(f64::from(k) * 2.3, f64::from(k) * 47.7),
+                irradiance: [1.0, 0.5, 2.0],
+            })
+            .collect();
+        let viewer = [0.0, 0.0, 1.0];
+        for dense in [&skewed, &even] {
+            let table = Tabulated::scaled(dense, 1.5);
+            let together = table.shade(&points, &lights, viewer);
+            let each = shade_one_by_one(&table, &points, &lights, viewer);
+            for (k, (a, b)) in together.iter().zip(&each).enumerate() {
+                for c in 0..3 {
+                    assert!((a[c] - b[c]).abs() <= 1e-4 * b[c], "{k}: {a:?} {b:?}");
+                }
+            }
+            assert!(each.iter().filter(|rgb| rgb[0] == 0.0).count() > 20);
         }
     }
 }

@@ -13,7 +13,7 @@ pub fn section(fits: &[FitNote]) -> Markup {
         h2 { "Models fitted" }
         p.soft {
             "Each against the dense data: RMS of the log ratio, cosine-weighted error, mean ΔE2000 of a rendered sphere. \
-             Uncertainties are as if residuals were independent, too small where the model is wrong."
+             Uncertainties are standard ones, from how much the residuals vary together over patches of 30°."
         }
         div.wide { table {
             thead { tr {

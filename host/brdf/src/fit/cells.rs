@@ -1,6 +1,7 @@
 //! The cells that a model is fitted to: a few thousand say as much as sixty million.
 
 use super::random::Random;
+use crate::bins::Bins;
 use crate::dense::DenseBrdf;
 use crate::direction::Vec3;
 
@@ -36,7 +37,7 @@ pub fn draw(dense: &DenseBrdf, count: usize, seed: u64) -> Vec<Cell> {
             break node;
         }
     };
-    let mut candidate = || {
+    let candidate = || {
         let light = node(90.0);
         let is_void_at = grid.direction(light).theta_deg() > VOID_DEG;
         let view = node(if is_void_at { VOID_DEG - 1.0 } else { 90.0 });
@@ -50,6 +51,29 @@ pub fn draw(dense: &DenseBrdf, count: usize, seed: u64) -> Vec<Cell> {
             value: dense.at(light, view).map(f64::from),
         }
     };
+    even_and_bright(count, candidate)
+}
+
+/// The same of what was measured: bins at their mean directions, half of them any, half by brightness.
+/// Unlike cells between them they owe nothing to the interpolation.
+pub fn draw_measured(bins: &Bins, count: usize, seed: u64) -> Vec<Cell> {
+    let bins = bins.bins();
+    let mut random = Random::new(seed);
+    if bins.is_empty() {
+        return Vec::new();
+    }
+    even_and_bright(count, || {
+        let bin = &bins[(random.share() * bins.len() as f64) as usize];
+        Cell {
+            light: bin.light.map(f64::from),
+            view: bin.view.map(f64::from),
+            value: bin.median.map(f64::from),
+        }
+    })
+}
+
+/// Half of the cells as the candidates come, half in proportion to f cos θi cos θv.
+fn even_and_bright(count: usize, mut candidate: impl FnMut() -> Cell) -> Vec<Cell> {
     let mut cells: Vec<Cell> = (0..count - count / 2).map(|_| candidate()).collect();
     let candidates: Vec<Cell> = (0..count / 2 * CANDIDATES).map(|_| candidate()).collect();
     let weight =

@@ -36,18 +36,7 @@ pub fn minimise(
     let mut damping = 1e-2;
     let (mut there, mut moved) = (Vec::new(), at.clone());
     for iteration in 0..iterations {
-        let mut jacobian = DMatrix::zeros(here.len(), n);
-        for k in 0..n {
-            moved.copy_from_slice(&at);
-            moved[k] += STEP;
-            residuals(&moved, &mut there);
-            let column = there.iter().zip(&here).map(|(a, b)| (a - b) / STEP);
-            jacobian
-                .column_mut(k)
-                .iter_mut()
-                .zip(column)
-                .for_each(|(to, d)| *to = d);
-        }
+        let jacobian = jacobian(residuals, &at, &here, |_| STEP);
         let normal = jacobian.tr_mul(&jacobian);
         let gradient = jacobian.tr_mul(&DVector::from_column_slice(&here));
         let mut gain = 0.0;
@@ -93,6 +82,28 @@ pub fn minimise(
         converged: false,
         iterations,
     }
+}
+
+/// The derivatives of the residuals, which are `here` at a point, by differences over a step of each
+/// number.
+pub(super) fn jacobian(
+    residuals: &dyn Fn(&[f64], &mut Vec<f64>),
+    at: &[f64],
+    here: &[f64],
+    step: impl Fn(usize) -> f64,
+) -> DMatrix<f64> {
+    let mut jacobian = DMatrix::zeros(here.len(), at.len());
+    let (mut there, mut moved) = (Vec::new(), at.to_vec());
+    for k in 0..at.len() {
+        moved[k] += step(k);
+        residuals(&moved, &mut there);
+        moved[k] = at[k];
+        let column = there.iter().zip(here).map(|(a, b)| (a - b) / step(k));
+        for (derivative, found) in jacobian.column_mut(k).iter_mut().zip(column) {
+            *derivative = found;
+        }
+    }
+    jacobian
 }
 
 fn sum_of_squares(residuals: &[f64]) -> f64 {

@@ -1,4 +1,4 @@
-//! Fits of analytic models to a dense BRDF.
+//! Fits of analytic models to a dense BRDF, or to the bins behind it.
 //!
 //! The residual of a cell and channel is `ln((f + ε)/(d + ε))` with ε a thousandth of the mean
 //! (published comparisons find logarithms the loss that agrees best with what people see; ε keeps
@@ -12,11 +12,10 @@ mod random;
 mod range;
 mod uncertainty;
 
-pub use cells::{Cell, draw};
+pub use cells::{Cell, draw, draw_measured};
 pub use family::{Family, Parameter, UnknownFamily};
 pub use range::Range;
 
-use crate::dense::DenseBrdf;
 use crate::model::Brdf;
 use least_squares::{Minimum, minimise};
 use random::Random;
@@ -37,7 +36,7 @@ pub enum Loss {
 pub struct Settings {
     /// What is minimised.
     pub loss: Loss,
-    /// Cells of the last search.
+    /// Cells to draw for the last search.
     pub cells: usize,
     /// Random starts.
     pub starts: usize,
@@ -66,8 +65,8 @@ pub struct Fit {
     pub family: Family,
     /// Its numbers, in their canonical form.
     pub values: Vec<f64>,
-    /// The standard uncertainty of each, as if the residuals were independent; `None` where the data
-    /// do not determine it.
+    /// The standard uncertainty of each, from how much residuals vary together over patches of 30°;
+    /// `None` where the data do not determine the number.
     pub uncertainties: Vec<Option<f64>>,
     /// Root mean square of the residuals over the cells of the fit.
     pub residual_rms: f64,
@@ -97,18 +96,18 @@ const SECOND_STARTS: usize = 4;
 const SECOND_CELLS: usize = 2500;
 const SECOND_ITERATIONS: usize = 60;
 
-/// Fits a family to a table. `progress` is told the share done, 0 ..= 1, from any thread.
+/// Fits a family to cells, as [`draw`] or [`draw_measured`] gives `settings.cells` of them. `progress` is
+/// told the share done, 0 ..= 1, from any thread.
 ///
 /// # Errors
-/// A table without a positive value.
+/// No cell with a positive value.
 pub fn fit(
-    dense: &DenseBrdf,
+    cells: &[Cell],
     family: Family,
     settings: &Settings,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Fit, FitError> {
-    let cells = draw(dense, settings.cells.max(64), settings.seed);
-    let problem = Problem::new(&cells, family, settings.loss)?;
+    let problem = Problem::new(cells, family, settings.loss)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
     let starts: Vec<u64> = (0..settings.starts.max(1) as u64).collect();
     let mut first: Vec<Minimum> = starts
@@ -152,7 +151,7 @@ pub fn fit(
     let best = problem.search(start, cells.len(), settings.iterations);
     progress(1.0);
     let values = family.canonical(problem.values(&best.at));
-    let uncertainties = uncertainty::standard(&problem, &values, best.cost);
+    let uncertainties = uncertainty::standard(&problem, &values);
     let residuals = 3 * cells.len();
     Ok(Fit {
         family,

@@ -16,6 +16,7 @@ pub use microcylinder::{Microcylinder, Reciprocal, Thread};
 pub use ward::Ward;
 
 use crate::direction::{Vec3, normalize};
+use crate::shading::{Frame, Light, shade_one_by_one};
 
 /// A BRDF in 1/sr, per channel.
 pub trait Brdf: Send + Sync {
@@ -23,17 +24,10 @@ pub trait Brdf: Send + Sync {
     /// light is not included.
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3];
 
-    /// The radiance towards the viewer under several lights: directions with z > 0, each with its
-    /// irradiance per channel, the cosine included.
-    fn radiance(&self, lights: &[(Vec3, [f64; 3])], view: Vec3) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (light, irradiance) in lights {
-            let f = self.eval(*light, view);
-            for c in 0..3 {
-                sum[c] += f[c] * irradiance[c];
-            }
-        }
-        sum
+    /// The radiance towards a viewer, in the direction `viewer`, of each of many points of a surface
+    /// under the same lights; none where the viewer is behind the surface.
+    fn shade(&self, points: &[Frame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
+        shade_one_by_one(self, points, lights, viewer)
     }
 }
 

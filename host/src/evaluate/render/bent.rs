@@ -6,23 +6,17 @@ use gonia_brdf::Brdf;
 /// Draws what fills the outline of a smooth upright cylinder seen from the side: the picture's left
 /// and right edges are the cylinder's. The material's x axis runs around it towards the right, its
 /// y axis up along it, both turned anticlockwise by `turn_deg`.
-pub fn bent(
-    brdf: &dyn Brdf,
-    lights: &[Light],
-    (width, height): (usize, usize),
-    turn_deg: f64,
-) -> Picture {
+pub fn bent(brdf: &dyn Brdf, lights: &[Light], size: (usize, usize), turn_deg: f64) -> Picture {
     let (turn_sin, turn_cos) = turn_deg.to_radians().sin_cos();
-    Picture::draw_oblong(width, height, 1, |x, _| {
+    Picture::draw(brdf, lights, size, 1, |x, _| {
         let forwards = (1.0 - x * x).max(0.0).sqrt();
         let (around, up) = ([forwards, 0.0, -x], [0.0, 1.0, 0.0]);
         let mix = |a: f64, b: f64| [0, 1, 2].map(|k| a * around[k] + b * up[k]);
-        let frame = Frame {
+        Some(Frame {
             tangent: mix(turn_cos, turn_sin),
             bitangent: mix(-turn_sin, turn_cos),
             normal: [x, 0.0, forwards],
-        };
-        Some(frame.shade(brdf, lights))
+        })
     })
 }
 

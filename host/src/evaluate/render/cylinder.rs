@@ -15,12 +15,12 @@ const FOLDS: f64 = 9.0;
 /// Draws a draped cylinder, `px` × `px` pixels of `side`² points. The material's x axis runs around
 /// the cylinder towards the right, its y axis upwards along it.
 pub fn cylinder(brdf: &dyn Brdf, lights: &[Light], px: usize, side: usize) -> Picture {
-    Picture::draw(px, side, |x, y| {
+    Picture::draw(brdf, lights, (px, px), side, |x, y| {
         if y.abs() > HALF_HEIGHT {
             return None;
         }
         let azimuth = front_azimuth(x, y)?;
-        Some(frame_at(azimuth, y).shade(brdf, lights))
+        Some(frame_at(azimuth, y))
     })
 }
 

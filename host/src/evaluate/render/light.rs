@@ -1,16 +1,8 @@
 //! Directional lights.
 
 use gonia_brdf::direction::{Vec3, normalize};
+use gonia_brdf::shading::Light;
 use std::f64::consts::PI;
-
-/// A light at infinity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Light {
-    /// Unit vector towards it, in camera space.
-    pub towards: Vec3,
-    /// Irradiance it gives a surface that faces it, per channel. π makes a white Lambertian one.
-    pub irradiance: [f64; 3],
-}
 
 /// A single light from above the camera, 40° from the line of sight.
 pub fn single() -> Vec<Light> {

@@ -1,7 +1,14 @@
 //! A picture in linear light.
 
+use super::VIEWER;
 use crate::evaluate::color::luminance;
+use gonia_brdf::Brdf;
+use gonia_brdf::shading::{Frame, Light};
 use rayon::prelude::*;
+
+/// Points that are shaded together: enough that a table's rows are read once for many of them, few
+/// enough that a large picture does not fill the memory.
+const POINTS_AT_ONCE: usize = 1 << 20;
 
 /// Radiance and coverage, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,42 +24,43 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Draws `px` × `px` pixels of the square −1 ..= 1, from `side`² points each. `radiance` gives
-    /// the radiance at a point (x right, y up), or `None` where there is no surface.
+    /// Draws `width` × `height` pixels, of which both sides run from −1 to 1, from `side`² points each.
+    /// `frame_at` gives how the surface lies at a point (x right, y up), or `None` beside it.
     pub(super) fn draw(
-        px: usize,
+        brdf: &dyn Brdf,
+        lights: &[Light],
+        (width, height): (usize, usize),
         side: usize,
-        radiance: impl Fn(f64, f64) -> Option<[f64; 3]> + Sync,
-    ) -> Self {
-        Self::draw_oblong(px, px, side, radiance)
-    }
-
-    /// The same of `width` × `height` pixels, of which both sides run from −1 to 1.
-    pub(super) fn draw_oblong(
-        width: usize,
-        height: usize,
-        side: usize,
-        radiance: impl Fn(f64, f64) -> Option<[f64; 3]> + Sync,
+        frame_at: impl Fn(f64, f64) -> Option<Frame> + Sync,
     ) -> Self {
         let place = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / (n * side) as f64 - 1.0;
-        let pixel = |at: usize| {
-            let (column, row) = (at % width, at / width);
-            let mut sum = [0.0; 3];
-            let mut hits = 0usize;
-            for sub in 0..side * side {
-                let x = place(column * side + sub % side, width);
-                let y = -place(row * side + sub / side, height);
-                if let Some(rgb) = radiance(x, y) {
-                    hits += 1;
+        let frame = |point: usize| {
+            let (pixel, sub) = (point / (side * side), point % (side * side));
+            let (column, row) = (pixel % width, pixel / width);
+            let x = place(column * side + sub % side, width);
+            let y = -place(row * side + sub / side, height);
+            frame_at(x, y)
+        };
+        let n = width * height;
+        let (mut rgb, mut cover) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let band = (POINTS_AT_ONCE / (side * side)).max(1);
+        for first in (0..n).step_by(band) {
+            let points = first * side * side..n.min(first + band) * side * side;
+            let frames: Vec<Option<Frame>> = points.into_par_iter().map(frame).collect();
+            let seen: Vec<Frame> = frames.iter().copied().flatten().collect();
+            let mut shaded = brdf.shade(&seen, lights, VIEWER).into_iter();
+            for pixel in frames.chunks_exact(side * side) {
+                let hits = pixel.iter().flatten().count();
+                let mut sum = [0.0f32; 3];
+                for radiance in shaded.by_ref().take(hits) {
                     for c in 0..3 {
-                        sum[c] += rgb[c];
+                        sum[c] += radiance[c];
                     }
                 }
+                rgb.push(sum.map(|v| v / hits.max(1) as f32));
+                cover.push(hits as f32 / (side * side) as f32);
             }
-            let mean = sum.map(|v| (v / hits.max(1) as f64) as f32);
-            (mean, hits as f32 / (side * side) as f32)
-        };
-        let (rgb, cover) = (0..width * height).into_par_iter().map(pixel).unzip();
+        }
         Self {
             width,
             height,

@@ -11,10 +11,10 @@ const RADIUS: f64 = 0.96;
 /// parallels towards the right, its y axis along the meridians towards the north pole, which is
 /// straight up; so threads show as on a globe wound around.
 pub fn sphere(brdf: &dyn Brdf, lights: &[Light], px: usize, side: usize) -> Picture {
-    Picture::draw(px, side, |x, y| {
+    Picture::draw(brdf, lights, (px, px), side, |x, y| {
         let (x, y) = (x / RADIUS, y / RADIUS);
         let z2 = 1.0 - x * x - y * y;
-        (z2 > 0.0).then(|| frame_at([x, y, z2.sqrt()]).shade(brdf, lights))
+        (z2 > 0.0).then(|| frame_at([x, y, z2.sqrt()]))
     })
 }
 
