@@ -4,18 +4,15 @@
 #[path = "common/session.rs"]
 mod session;
 
-use gonia::camera::{Camera, CameraError, RenderingCamera};
+use gonia::camera::{Camera, CameraError, Pulse, RenderingCamera};
 use gonia::capture::{Arms, Capture, Ended, Orders, Told, Watch};
-use gonia::dataset::{Frame, FrameRow, Rig};
-use gonia::session::{
-    Beginning, Claim, ControllerIdentity, End, Entry, Provenance, SessionFolder, SessionWriter,
-    verify,
-};
+use gonia::dataset::{Frame, FrameRow};
+use gonia::session::{End, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
 use gonia_sim::bench::Bench;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
 use gonia_sim::rig::SimRig;
-use session::{small_plan, small_rig};
+use session::{begin, small_rig};
 use std::path::Path;
 
 const POSES: usize = 12;
@@ -54,11 +51,11 @@ impl Camera for Troubled {
         Ok(std::mem::take(&mut self.extra))
     }
 
-    fn fetch(&mut self, shot: &FrameRow, exposures_s: &[f64]) -> Result<Frame, CameraError> {
+    fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
         let act = (self.trouble)(self.calls, self.first_pose);
         self.calls += 1;
         self.first_pose += u32::from(shot.frame == 0);
-        let mut frame = self.camera.fetch(shot, exposures_s)?;
+        let mut frame = self.camera.fetch(shot, pulses)?;
         match act {
             Some(Act::Late) => {
                 return Err(CameraError::Late {
@@ -98,42 +95,6 @@ struct Nobody;
 
 impl Watch for Nobody {
     fn tell(&self, _: &Told) {}
-}
-
-fn begin(folder: &Path, rig: &Rig) -> SessionWriter {
-    let arm = ControllerIdentity {
-        board: "sim".into(),
-        firmware: String::new(),
-        config_crc: String::new(),
-    };
-    let provenance = Provenance {
-        program: "test".into(),
-        began: String::new(),
-        rig_crc: String::new(),
-        plan_crc: String::new(),
-        reference: rig.session.as_ref().unwrap().reference,
-        camera: "troubled".into(),
-        seed: Some(1),
-        light_arm: arm.clone(),
-        camera_arm: arm,
-    };
-    let rig = toml_of(rig);
-    let beginning = Beginning {
-        rig: rig.as_bytes(),
-        beside: None,
-        plan: &small_plan(POSES),
-        provenance: &provenance,
-    };
-    let mut writer = Claim::new(folder, None).unwrap().begin(beginning).unwrap();
-    writer.note(&Entry::Start("test".into())).unwrap();
-    writer
-}
-
-fn toml_of(rig: &Rig) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("rig.toml");
-    gonia::dataset::rig_toml::write_rig(&path, rig).unwrap();
-    std::fs::read_to_string(path).unwrap()
 }
 
 fn run(
@@ -179,7 +140,7 @@ fn under(trouble: Trouble, faults: FaultPlan) -> (tempfile::TempDir, Ended) {
     let folder = tempfile::tempdir().unwrap();
     let mut rig = small_rig();
     rig.session.as_mut().unwrap().reference = false;
-    let writer = begin(folder.path(), &rig);
+    let writer = begin(folder.path(), &rig, POSES);
     let orders = Orders::default();
     let ended = run(folder.path(), writer, faults, trouble, &orders, true);
     (folder, ended)
@@ -311,7 +272,7 @@ fn a_full_disk_ends_the_session_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let mut rig = small_rig();
     rig.session.as_mut().unwrap().disk_reserve_mb = u64::MAX / 2;
-    let writer = begin(folder.path(), &rig);
+    let writer = begin(folder.path(), &rig, POSES);
     let orders = Orders::default();
     let ended = run(
         folder.path(),
@@ -329,7 +290,7 @@ fn a_full_disk_ends_the_session_before_anything_is_written() {
 #[test]
 fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
     let folder = tempfile::tempdir().unwrap();
-    let writer = begin(folder.path(), &small_rig());
+    let writer = begin(folder.path(), &small_rig(), POSES);
     let orders = Orders::default();
     let first = run(
         folder.path(),
@@ -358,7 +319,7 @@ fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
 #[test]
 fn orders_end_a_session_and_it_goes_on_from_there() {
     let folder = tempfile::tempdir().unwrap();
-    let writer = begin(folder.path(), &small_rig());
+    let writer = begin(folder.path(), &small_rig(), POSES);
     let orders = Orders::default();
     orders.interrupt();
     let ended = run(

@@ -16,6 +16,8 @@ pub struct Bench {
     now_us: u64,
     trigger: bool,
     rising_edges: u32,
+    /// A pulse has ended.
+    has_fallen: bool,
     holds_interlock_open: bool,
     interlock_closed: bool,
     store: Store,
@@ -104,6 +106,7 @@ impl Bench {
             now_us: 0,
             trigger: false,
             rising_edges: 0,
+            has_fallen: false,
             holds_interlock_open: false,
             interlock_closed: true,
             store: Store::default(),
@@ -154,6 +157,11 @@ impl Bench {
         core::mem::take(&mut self.rising_edges)
     }
 
+    /// Whether a pulse of the trigger output has ended since the last call.
+    pub fn take_fall(&mut self) -> bool {
+        core::mem::take(&mut self.has_fallen)
+    }
+
     /// Whether this controller holds the shared interlock open.
     pub fn holds_interlock_open(&self) -> bool {
         self.holds_interlock_open
@@ -183,6 +191,7 @@ impl Bench {
 
     /// Outputs fall back to what they are without a controller.
     pub fn reset_outputs(&mut self) {
+        self.has_fallen |= self.trigger;
         self.trigger = false;
         self.holds_interlock_open = false;
         self.steps = [0; 2].map(|_| VirtualTimer::at_rest(self.now_us));
@@ -228,6 +237,7 @@ impl Hardware for Bench {
         if on && !self.trigger {
             self.rising_edges += 1;
         }
+        self.has_fallen |= self.trigger && !on;
         self.trigger = on;
     }
 

@@ -20,6 +20,8 @@ pub struct TriggerRecord {
     pub sequence: u32,
     /// Virtual time, µs.
     pub time_us: u64,
+    /// How long it was, µs; `None` while it lasts.
+    pub width_us: Option<u64>,
     /// The arm that gave it.
     pub source: Arm,
     /// True θ and φ of the light arm, degrees.

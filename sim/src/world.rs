@@ -169,6 +169,13 @@ impl World {
             arm.node.trigger_edge(now_us, &mut arm.bench);
         }
         let edges = arm.bench.take_rising_edges();
+        if arm.bench.take_fall() {
+            let source = Arm::BOTH[i];
+            let ended = self.triggers.iter_mut().rev().find(|t| t.source == source);
+            if let Some(trigger) = ended {
+                trigger.width_us = Some(now_us - trigger.time_us);
+            }
+        }
         self.send_frames(i);
         for _ in 0..edges {
             self.trigger(i);
@@ -208,6 +215,7 @@ impl World {
         let record = TriggerRecord {
             sequence: self.triggers.len() as u32,
             time_us: now_us,
+            width_us: None,
             source: Arm::BOTH[source],
             light_deg: self.arms[0].bench.true_deg(now_us),
             camera_deg: self.arms[1].bench.true_deg(now_us),

@@ -2,7 +2,7 @@
 
 use crate::fuzz;
 use crate::size::{budget_of, size_of};
-use crate::tools::{TARGET, add_target, install, run};
+use crate::tools::{TARGET, add_target, install, install_library, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,12 +11,16 @@ use std::time::Instant;
 /// The board that runs in QEMU.
 const QEMU_BOARD: &str = "qemu-mps2";
 
+/// What the feature `genicam` is built with.
+const ARAVIS: [&str; 3] = ["libaravis-dev", "libusb-1.0-0-dev", "pkg-config"];
+
 /// All that a change must pass.
 pub fn test() -> Result<()> {
     let root = root()?;
     let mut table = Table::default();
     table.step("target for the boards", add_target)?;
     let qemu = install("qemu-system-arm", "qemu-system-arm");
+    let genicam = install_library("aravis-0.8", &ARAVIS);
     table.step("format", || {
         run(cargo(&root).args(["fmt", "--all", "--check"]))?;
         for board in board_folders(&root)? {
@@ -34,19 +38,45 @@ pub fn test() -> Result<()> {
             "warnings",
         ]))
     })?;
+    // With the cameras, if their library is there; without, the step above has looked at it all.
+    let features: &[&str] = if genicam {
+        &["--features", "gonia/genicam"]
+    } else {
+        &[]
+    };
+    if genicam {
+        table.step("clippy with GenICam", || {
+            run(cargo(&root)
+                .args(["clippy", "--workspace", "--all-targets"])
+                .args(features)
+                .args(["--", "-D", "warnings"]))
+        })?;
+    } else {
+        table.not_run(
+            "sessions through GigE Vision",
+            &format!(
+                "the library aravis is missing: apt-get install {}",
+                ARAVIS.join(" ")
+            ),
+        );
+    }
     table.step("boards", || build_boards(&root))?;
     table.step("size of the boards", || check_sizes(&root))?;
-    table.step("tests", || run(cargo(&root).args(["test", "--workspace"])))?;
+    table.step("tests", || {
+        run(cargo(&root).args(["test", "--workspace"]).args(features))
+    })?;
     // Here and below with the whole workspace's features, as all has been built for the tests above.
     table.step("sessions that are killed", || {
         run(cargo(&root)
             .args(["test", "--workspace", "--test", "capture"])
+            .args(features)
             .args(["--", "--ignored", "--nocapture", "--test-threads", "1"]))
     })?;
     if qemu {
         table.step("firmware in QEMU", || {
             run(cargo(&root)
                 .args(["test", "--workspace", "--test", "controllers_qemu"])
+                .args(features)
                 .args(["--", "--ignored", "--nocapture"])
                 .env("GONIA_QEMU_ELF", qemu_elf(&root)))
         })?;
@@ -60,6 +90,7 @@ pub fn test() -> Result<()> {
         table.step("the report in a browser", || {
             run(cargo(&root)
                 .args(["test", "--workspace", "--test", "browser"])
+                .args(features)
                 .args(["--", "--ignored"])
                 .env("GONIA_BROWSER", "chromium"))
         })?;

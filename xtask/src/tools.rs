@@ -28,15 +28,34 @@ pub fn add_target() -> Result<()> {
 
 /// Installs a Debian package when this user may; whether `program` is there afterwards.
 pub fn install(program: &str, package: &str) -> bool {
-    if has(program) {
-        return true;
+    if !has(program) {
+        apt_get(&[package]);
     }
+    has(program)
+}
+
+/// Installs what a C library needs when this user may; whether it is there afterwards, for builds.
+pub fn install_library(name: &str, packages: &[&str]) -> bool {
+    let has_it = || {
+        Command::new("pkg-config")
+            .args(["--exists", name])
+            .status()
+            .is_ok_and(|s| s.success())
+    };
+    if !has_it() {
+        apt_get(packages);
+    }
+    has_it()
+}
+
+/// Installs Debian packages when this user may.
+fn apt_get(packages: &[&str]) {
     let root = Command::new("id")
         .arg("-u")
         .output()
         .is_ok_and(|o| o.stdout.trim_ascii() == b"0");
     if root && has("apt-get") {
-        println!("installing {package}");
+        println!("installing {}", packages.join(" "));
         let quiet = |arguments: &[&str]| {
             Command::new("apt-get")
                 .args(arguments)
@@ -46,10 +65,15 @@ pub fn install(program: &str, package: &str) -> bool {
                 .is_ok_and(|s| s.success())
         };
         if quiet(&["-qq", "update"]) {
-            quiet(&["-qq", "install", "--no-install-recommends", "-y", package]);
+            quiet(
+                &[
+                    &["-qq", "install", "--no-install-recommends", "-y"],
+                    packages,
+                ]
+                .concat(),
+            );
         }
     }
-    has(program)
 }
 
 /// Runs a command, its output going where ours goes.

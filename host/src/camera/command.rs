@@ -1,7 +1,7 @@
 //! A program that is run for every frame, and exposes it.
 
 use super::files::frame_of;
-use super::source::{Camera, CameraError};
+use super::source::{Camera, CameraError, Pulse};
 use crate::dataset::{Frame, FrameRow, Rig};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -83,7 +83,7 @@ impl Camera for CommandCamera {
         Ok(0)
     }
 
-    fn fetch(&mut self, shot: &FrameRow, exposures_s: &[f64]) -> Result<Frame, CameraError> {
+    fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
         let failed = |what: String| CameraError::Failed(what);
         let folder = tempfile::tempdir()
             .map_err(|error| failed(format!("no temporary folder for the frame ({error})")))?;
@@ -103,13 +103,13 @@ impl Camera for CommandCamera {
             .filter_map(|item| Some(item.ok()?.path()))
             .collect();
         files.sort();
-        let (came, expected) = (files.len(), exposures_s.len());
+        let (came, expected) = (files.len(), pulses.len());
         if came != expected {
             return Err(failed(format!(
                 "the program left {came} files where {expected} are due; check {{file}} in source.run"
             )));
         }
-        frame_of(&self.rig, &files, exposures_s)
+        frame_of(&self.rig, &files, pulses)
     }
 
     fn reopen(&mut self) -> Result<(), CameraError> {
@@ -140,7 +140,7 @@ mod tests {
             },
             file: String::new(),
         };
-        CommandCamera::new(&Rig::paper(32), run, timeout_s).fetch(&row, &[0.01])
+        CommandCamera::new(&Rig::paper(32), run, timeout_s).fetch(&row, &[Pulse::new(0.01, 0)])
     }
 
     #[test]

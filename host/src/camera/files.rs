@@ -1,23 +1,23 @@
 //! A frame from files, as cameras and their programs leave them.
 
-use super::source::CameraError;
+use super::source::{CameraError, Pulse};
 use crate::dataset::frame_exr::read_frame_of_size;
 use crate::dataset::{Frame, Rig};
 use crate::hdr::merge_files;
 use std::path::{Path, PathBuf};
 
-/// The frame of a shot's files, in the order of its exposures: PNGs of raw counts, or one OpenEXR of
+/// The frame of a shot's files, in the order of its pulses: PNGs of raw counts, or one OpenEXR of
 /// linear radiance.
-pub fn frame_of(rig: &Rig, files: &[PathBuf], exposures_s: &[f64]) -> Result<Frame, CameraError> {
+pub fn frame_of(rig: &Rig, files: &[PathBuf], pulses: &[Pulse]) -> Result<Frame, CameraError> {
     if let [file] = files
         && is_exr(file)
     {
         let camera = &rig.camera;
         return Ok(read_frame_of_size(file, camera.width_px, camera.height_px)?);
     }
-    let bracket: Vec<(f64, PathBuf)> = exposures_s
+    let bracket: Vec<(f64, PathBuf)> = pulses
         .iter()
-        .copied()
+        .map(|pulse| pulse.exposure_s)
         .zip(files.iter().cloned())
         .collect();
     Ok(merge_files(rig, &bracket)?.frame)

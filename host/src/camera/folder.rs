@@ -1,7 +1,7 @@
 //! A folder that another program fills: a file for every trigger pulse, in the order of their names.
 
 use super::files::{frame_of, is_foreign};
-use super::source::{Camera, CameraError};
+use super::source::{Camera, CameraError, Pulse};
 use crate::dataset::{FileError, Frame, FrameRow, Rig};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -73,9 +73,9 @@ impl Camera for FolderCamera {
         Ok(unasked)
     }
 
-    fn fetch(&mut self, _: &FrameRow, exposures_s: &[f64]) -> Result<Frame, CameraError> {
+    fn fetch(&mut self, _: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
         let until = Instant::now() + self.timeout;
-        let expected = exposures_s.len();
+        let expected = pulses.len();
         loop {
             let files = self.wait_for(expected, until)?;
             let came = files.len();
@@ -92,7 +92,7 @@ impl Camera for FolderCamera {
                     timeout_s,
                 });
             }
-            match frame_of(&self.rig, &files, exposures_s) {
+            match frame_of(&self.rig, &files, pulses) {
                 // It may still be being written.
                 Err(_) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
                 result => {
@@ -144,21 +144,24 @@ mod tests {
         assert_eq!(camera.ready(0), Ok(0));
         put("1.exr");
         std::fs::write(folder.path().join("notes.txt"), "x").unwrap();
-        assert_eq!(camera.fetch(&row(), &[0.01]), Ok(frame.clone()));
+        assert_eq!(
+            camera.fetch(&row(), &[Pulse::new(0.01, 0)]),
+            Ok(frame.clone())
+        );
         // One that nobody asked for, and one whose shot was given up.
         put("2.exr");
         put("3.exr");
         assert_eq!(camera.ready(1), Ok(1));
-        let late = camera.fetch(&row(), &[0.01]).unwrap_err();
+        let late = camera.fetch(&row(), &[Pulse::new(0.01, 0)]).unwrap_err();
         assert!(matches!(late, CameraError::Late { came: 0, .. }));
         put("4.exr");
         put("5.exr");
-        let many = camera.fetch(&row(), &[0.01]).unwrap_err();
+        let many = camera.fetch(&row(), &[Pulse::new(0.01, 0)]).unwrap_err();
         assert!(matches!(many, CameraError::TooMany { came: 2, .. }));
         // Half a file is waited for, and then refused.
         std::fs::write(folder.path().join("6.exr"), [0; 10]).unwrap();
         assert!(matches!(
-            camera.fetch(&row(), &[0.01]),
+            camera.fetch(&row(), &[Pulse::new(0.01, 0)]),
             Err(CameraError::File(_))
         ));
         std::fs::remove_dir_all(folder.path()).unwrap();

@@ -1,7 +1,7 @@
 //! The simulated rig's camera in a session: it renders a frame for every trigger.
 
 use super::simulated::{geometry_of, render};
-use super::source::{Camera, CameraError};
+use super::source::{Camera, CameraError, Pulse};
 use crate::dataset::rig::Reference;
 use crate::dataset::{Frame, FrameRow, Rig, Role};
 use gonia_brdf::Vec3;
@@ -48,7 +48,7 @@ impl Camera for RenderingCamera {
         Ok(0)
     }
 
-    fn fetch(&mut self, shot: &FrameRow, _: &[f64]) -> Result<Frame, CameraError> {
+    fn fetch(&mut self, shot: &FrameRow, _: &[Pulse]) -> Result<Frame, CameraError> {
         // The next trigger comes only after this: the last one is this shot's.
         let pose = if self.exact {
             shot.pose

@@ -2,10 +2,30 @@
 
 use crate::dataset::{FileError, Frame, FrameRow};
 
+/// A trigger pulse that was given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pulse {
+    /// How long it was, and so the exposure, seconds.
+    pub exposure_s: f64,
+    /// When it rose, by the clock of the controller that gave it, µs.
+    pub time_us: u64,
+}
+
+impl Pulse {
+    /// With its length and its time.
+    pub fn new(exposure_s: f64, time_us: u64) -> Self {
+        Self {
+            exposure_s,
+            time_us,
+        }
+    }
+}
+
 /// Gives a frame for every shot of a session.
 ///
 /// Frames and trigger pulses are matched by count: before each trigger the session says by
-/// [`Camera::ready`] that what came until then belongs to earlier ones.
+/// [`Camera::ready`] that what came until then belongs to earlier ones. A camera that numbers its
+/// frames and tells their time matches by these too ([`super::matching`]).
 pub trait Camera: Send {
     /// Maker, model, serial number: what a person would look for in the morning.
     fn identity(&self) -> String;
@@ -18,12 +38,11 @@ pub trait Camera: Send {
     /// The camera is gone.
     fn ready(&mut self, strays: usize) -> Result<usize, CameraError>;
 
-    /// The frame of the shot that was triggered last, merged from its exposures (seconds, one a
-    /// pulse).
+    /// The frame of the shot that was triggered last, merged from the exposures of its pulses.
     ///
     /// # Errors
     /// No frame, or one that cannot be used; the shot can be taken again.
-    fn fetch(&mut self, shot: &FrameRow, exposures_s: &[f64]) -> Result<Frame, CameraError>;
+    fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError>;
 
     /// Opens the camera anew after an error.
     ///
@@ -66,6 +85,21 @@ pub enum CameraError {
         /// Pulses given.
         expected: usize,
     },
+    /// Part of a frame was lost on the way.
+    #[error(
+        "frame {frame} of {expected} arrived incomplete ({status}); check the network, its packet size and the socket buffers"
+    )]
+    Incomplete {
+        /// Which, from 1.
+        frame: usize,
+        /// Pulses given.
+        expected: usize,
+        /// In the library's words.
+        status: String,
+    },
+    /// Frames came that are not of the shot's pulses, by their numbers or their times.
+    #[error("the frames are not those of the trigger pulses: {0}; check the trigger cable")]
+    OtherPulse(String),
     /// It came, and cannot be used.
     #[error(transparent)]
     File(#[from] FileError),

@@ -58,11 +58,20 @@ pub struct Arms {
     at_udeg: [[i32; 2]; 2],
 }
 
+/// What both controllers latched at a pulse.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Latched {
+    /// Of light arm and camera arm, µdeg.
+    pub encoder_udeg: [[i32; 2]; 2],
+    /// When, by the clock of the camera arm, which gives the pulse, µs.
+    pub time_us: u64,
+}
+
 /// What came of a try.
 #[derive(Debug)]
 pub(super) enum Try {
-    /// Latched encoders, µdeg: a pair of arms for each pulse.
-    Latched(Vec<[[i32; 2]; 2]>),
+    /// What was latched at each pulse.
+    Latched(Vec<Latched>),
     /// Nothing usable; it may be tried again.
     Again(String),
     /// A controller has latched a fault, has restarted, or does not answer.
@@ -329,7 +338,11 @@ impl Arms {
                     "an arm was outside its window at the trigger".into(),
                 ));
             }
-            latches.push(pair.map(|latch| latch.encoder_udeg));
+            let time_us = pair[1].time_us;
+            latches.push(Latched {
+                encoder_udeg: pair.map(|latch| latch.encoder_udeg),
+                time_us,
+            });
         }
         Ok(Try::Latched(latches))
     }

@@ -3,7 +3,7 @@
 
 use super::control::Comparison;
 use super::watch::{Told, Watch};
-use crate::camera::{Camera, CameraError};
+use crate::camera::{Camera, CameraError, Pulse};
 use crate::dataset::frame_exr::write_frame;
 use crate::dataset::{FileError, Frame, FrameRow, Role};
 use crate::process::{FrameSampler, Hidden, Outcome, SampledFrame};
@@ -30,6 +30,8 @@ pub struct Taken {
     pub task: Task,
     /// What it is of, and where the arms were.
     pub row: FrameRow,
+    /// Its trigger pulses.
+    pub pulses: Vec<Pulse>,
     /// The largest |commanded − encoder|, degrees.
     pub pointing_deg: f64,
 }
@@ -61,13 +63,12 @@ pub enum News {
 /// Fetches a frame for every shot.
 pub fn fetch_all(
     camera: &Mutex<Box<dyn Camera>>,
-    exposures_s: &[f64],
     shots: &Receiver<Taken>,
     work: &SyncSender<Work>,
     news: &Sender<News>,
 ) {
     for taken in shots {
-        let fetched = lock(camera).fetch(&taken.row, exposures_s);
+        let fetched = lock(camera).fetch(&taken.row, &taken.pulses);
         let told = match fetched {
             Ok(frame) => {
                 if work.send(Work::Frame(taken, frame)).is_err() {

@@ -5,12 +5,12 @@ use gonia_brdf::direction::{Direction, angle_between};
 use gonia_protocol::message::{Refusal, State};
 use std::time::{Duration, Instant};
 
-use super::arms::{Arms, HomeError, Try};
+use super::arms::{Arms, HomeError, Latched, Try};
 use super::timing::POINTING_LIMIT_DEG;
 use crate::link::LinkError;
 
 /// A shot that is kept.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
     /// Its pose's place in the list.
     pub index: usize,
@@ -20,6 +20,8 @@ pub struct Shot {
     pub pointing_error_deg: f64,
     /// How often it had to be taken again.
     pub retakes: u32,
+    /// When each pulse rose, by the clock of the controller that gave it, µs.
+    pub pulse_times_us: Vec<u64>,
 }
 
 /// What came of a pose.
@@ -341,14 +343,18 @@ fn sort_error(index: usize, error: LinkError) -> Result<Try, SessionError> {
     }
 }
 
-fn judge(index: usize, retakes: u32, targets: [[i32; 2]; 2], latches: &[[[i32; 2]; 2]]) -> Shot {
+fn judge(index: usize, retakes: u32, targets: [[i32; 2]; 2], latches: &[Latched]) -> Shot {
     let mut worst_udeg = 0;
     for latch in latches {
-        for (target, encoder) in targets.as_flattened().iter().zip(latch.as_flattened()) {
+        for (target, encoder) in targets
+            .as_flattened()
+            .iter()
+            .zip(latch.encoder_udeg.as_flattened())
+        {
             worst_udeg = worst_udeg.max(target.abs_diff(*encoder));
         }
     }
-    let last = latches.last().copied().unwrap_or(targets);
+    let last = latches.last().map_or(targets, |latch| latch.encoder_udeg);
     let direction = |[theta, phi]: [i32; 2]| {
         Direction::from_deg(f64::from(theta) * 1e-6, f64::from(phi) * 1e-6)
     };
@@ -360,5 +366,6 @@ fn judge(index: usize, retakes: u32, targets: [[i32; 2]; 2], latches: &[[[i32; 2
         },
         pointing_error_deg: f64::from(worst_udeg) * 1e-6,
         retakes,
+        pulse_times_us: latches.iter().map(|latch| latch.time_us).collect(),
     }
 }

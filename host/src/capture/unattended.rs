@@ -8,7 +8,7 @@ use super::desk::{Desk, Taken, Task, fetch_all, lock};
 use super::orders::Orders;
 use super::session::{SessionError, SessionSummary, Shooter, ShotOutcome};
 use super::watch::{Told, Watch};
-use crate::camera::Camera;
+use crate::camera::{Camera, Pulse};
 use crate::dataset::bench_setup::SessionSettings;
 use crate::dataset::{FileError, FrameRow, Rig, Role};
 use crate::process::{FrameSampler, Outcome, SampledFrame};
@@ -233,7 +233,7 @@ impl Measuring<'_> {
         std::thread::scope(|scope| {
             let tell_too = tell.clone();
             scope.spawn(move || {
-                fetch_all(camera, &settings.exposures_s, &to_fetch, &work, &tell_too);
+                fetch_all(camera, &to_fetch, &work, &tell_too);
             });
             scope.spawn(move || desk.work(&to_do, &tell));
             let mut result = self.take_all(shooter, &mut accounts, totals);
@@ -344,9 +344,12 @@ impl Measuring<'_> {
                     },
                     file,
                 };
+                let times = self.capture.settings.exposures_s.iter();
+                let pulses = times.zip(&shot.pulse_times_us);
                 accounts.triggered(Taken {
                     task,
                     row,
+                    pulses: pulses.map(|(s, us)| Pulse::new(*s, *us)).collect(),
                     pointing_deg: shot.pointing_error_deg,
                 })
             }

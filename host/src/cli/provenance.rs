@@ -10,7 +10,12 @@ pub fn of_this_program() -> Provenance {
     Provenance::from([("version".to_owned(), program())])
 }
 
-/// This program with its version.
+/// This program with its version, and the state of the sources where `GONIA_GIT` told it at build
+/// time, as the firmware's.
 pub fn program() -> String {
-    format!("gonia {}", env!("CARGO_PKG_VERSION"))
+    let version = env!("CARGO_PKG_VERSION");
+    match option_env!("GONIA_GIT") {
+        Some(sources) => format!("gonia {version} ({sources})"),
+        None => format!("gonia {version}"),
+    }
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Simulates both controllers, with their arms, until it is stopped with Ctrl-C.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does.\n\nWith --frames and --rig a camera stands beside them: it leaves a frame of the demo's fabric in the\nfolder for every trigger pulse, as [source] kind = \"folder\" wants them."
+    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does.\n\nWith --frames and --rig a camera stands beside them: it leaves a frame of the demo's fabric in the\nfolder for every trigger pulse, as [source] kind = \"folder\" wants them.\n\nBuilt with the feature genicam, --gige 127.0.0.1 and --rig make it a GigE Vision device at that address\ninstead, for [source] kind = \"genicam\": docs/cameras.md."
 )]
 pub struct SimDevice {
     /// Offer the controllers on pseudo-terminals (the default)
@@ -18,10 +18,14 @@ pub struct SimDevice {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Also be the camera: leave a frame in this folder for every trigger pulse
-    #[arg(long, value_name = "DIR", requires = "rig")]
+    #[arg(long, value_name = "DIR", requires = "rig", group = "camera")]
     frames: Option<PathBuf>,
+    /// Also be the camera: a GigE Vision device at this address of the loopback
+    #[cfg(feature = "genicam")]
+    #[arg(long, value_name = "ADDRESS", requires = "rig", group = "camera")]
+    gige: Option<std::net::Ipv4Addr>,
     /// The rig whose camera it is
-    #[arg(long, value_name = "RIG.toml", requires = "frames")]
+    #[arg(long, value_name = "RIG.toml", requires = "camera")]
     rig: Option<PathBuf>,
 }
 
@@ -40,8 +44,38 @@ impl SimDevice {
     pub fn run(self) -> Result<()> {
         // There is one door, so the option only says aloud what happens anyhow.
         let camera = self.frames.as_deref().zip(self.rig.as_deref());
-        ptys::serve(self.seed, camera)
+        let rig = gonia_sim::rig::SimRig::new(self.seed, gonia_sim::fault::FaultPlan::default());
+        #[cfg(feature = "genicam")]
+        let _gige = match (self.gige, &self.rig) {
+            (Some(address), Some(path)) => Some(gige(path, &rig, self.seed, address)?),
+            _ => None,
+        };
+        ptys::serve(&rig, self.seed, camera)
     }
+}
+
+/// The camera as a GigE Vision device, looking at the demo's fabric.
+#[cfg(all(unix, feature = "genicam"))]
+fn gige(
+    path: &std::path::Path,
+    arms: &gonia_sim::rig::SimRig,
+    seed: u64,
+    address: std::net::Ipv4Addr,
+) -> Result<crate::camera::SimulatedGige> {
+    use gonia_brdf::model::Kurt;
+    use std::sync::Arc;
+    let rig = crate::dataset::rig_toml::read_rig(path)?;
+    let (material, reference) = (Kurt::two_thread_fabric(), Kurt::white_reference_fabric());
+    let surfaces = (Arc::new(material) as _, Arc::new(reference) as _);
+    let arms = arms.clone();
+    Ok(crate::camera::SimulatedGige::start(
+        &rig,
+        arms,
+        surfaces,
+        seed,
+        address,
+        |_| None,
+    )?)
 }
 
 #[cfg(unix)]
@@ -54,7 +88,6 @@ mod ptys {
     use anyhow::{Context, bail};
     use gonia_brdf::Pose;
     use gonia_brdf::model::Kurt;
-    use gonia_sim::fault::FaultPlan;
     use gonia_sim::rig::{Arm, SimPort, SimRig};
     use gonia_sim::scene::Scene;
     use serialport::{SerialPort, TTYPort};
@@ -99,8 +132,7 @@ mod ptys {
         Ok(exposed)
     }
 
-    pub fn serve(seed: u64, camera: Option<(&Path, &Path)>) -> Result<()> {
-        let rig = SimRig::new(seed, FaultPlan::default());
+    pub fn serve(rig: &SimRig, seed: u64, camera: Option<(&Path, &Path)>) -> Result<()> {
         let camera = match camera {
             Some((folder, rig)) => Some(start_camera(folder, rig, seed)?),
             None => None,

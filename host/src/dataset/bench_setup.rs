@@ -1,6 +1,8 @@
 //! What `rig.toml` says of the bench itself: ports, where frames come from, how a session goes. Only
 //! `gonia capture` needs it.
 
+use super::genicam_setup::Genicam;
+use super::rig::Sensor;
 use super::rig_toml::RigError;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +53,8 @@ pub enum Source {
         #[serde(default = "default_timeout_s")]
         timeout_s: f64,
     },
+    /// A GigE Vision camera.
+    Genicam(Genicam),
 }
 
 /// How a session goes.
@@ -95,7 +99,7 @@ fn default_seed() -> u64 {
     1
 }
 
-fn default_timeout_s() -> f64 {
+pub(super) fn default_timeout_s() -> f64 {
     10.0
 }
 
@@ -107,6 +111,7 @@ pub(super) fn check_bench(
     arms: Option<&ArmPorts>,
     source: Option<&Source>,
     session: Option<&SessionSettings>,
+    sensor: Option<&Sensor>,
 ) -> Result<(), RigError> {
     let refuse = |key, problem: String, remedy: &str| {
         Err(RigError {
@@ -125,9 +130,11 @@ pub(super) fn check_bench(
         );
     }
     match source {
-        Some(Source::Folder { timeout_s, .. } | Source::Command { timeout_s, .. })
-            if !(0.01..=86_400.0).contains(timeout_s) =>
-        {
+        Some(
+            Source::Folder { timeout_s, .. }
+            | Source::Command { timeout_s, .. }
+            | Source::Genicam(Genicam { timeout_s, .. }),
+        ) if !(0.01..=86_400.0).contains(timeout_s) => {
             return refuse(
                 "source.timeout_s",
                 format!("{timeout_s} s is not possible"),
@@ -142,6 +149,9 @@ pub(super) fn check_bench(
                 "names no {file}".into(),
                 "give a program and its arguments, one of them {file}: where it leaves the frame",
             );
+        }
+        Some(Source::Genicam(camera)) => {
+            camera.check(sensor, session.map_or(1, |s| s.exposures_s.len()))?;
         }
         _ => {}
     }

@@ -17,6 +17,7 @@ pub mod fit_toml;
 pub mod frame;
 pub mod frame_exr;
 pub mod frames_csv;
+pub mod genicam_setup;
 pub mod masks_csv;
 pub mod merl;
 pub mod ngan;

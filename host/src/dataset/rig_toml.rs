@@ -170,7 +170,12 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
             remedy: "check the units: distances of the arms are in metres".into(),
         });
     }
-    check_bench(arms.as_ref(), source.as_ref(), session.as_ref())
+    check_bench(
+        arms.as_ref(),
+        source.as_ref(),
+        session.as_ref(),
+        sensor.as_ref(),
+    )
 }
 
 fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
@@ -242,6 +247,7 @@ fn within(
 
 #[cfg(test)]
 mod tests {
+    use super::super::bench_setup::Source;
     use super::super::rig::{Bayer, ReflectanceTable};
     use super::*;
 
@@ -272,6 +278,32 @@ mod tests {
         });
         write_rig(&path, &rig).unwrap();
         assert_eq!(read_rig(&path).unwrap(), rig);
+    }
+
+    #[test]
+    fn a_genicam_camera_is_read_with_its_defaults_and_not_without_an_address() {
+        let text = |address: &str| {
+            format!(
+                "{}\n[sensor]\nblack_counts = 64\nsaturation_counts = 4000\ngain_e_per_count = 2\nread_noise_e = 4\n[source]\nkind = \"genicam\"\naddress = \"{address}\"\npixel_format = \"Mono12\"\n",
+                paper_text()
+            )
+        };
+        let rig = read_text(&text("10.0.0.7")).unwrap();
+        let Some(Source::Genicam(camera)) = &rig.source else {
+            panic!("{:?}", rig.source);
+        };
+        assert_eq!(
+            (camera.trigger_source.as_str(), camera.timeout_s),
+            ("Line1", 10.0)
+        );
+        let error = read_text(&text("")).unwrap_err().to_string();
+        assert!(
+            error.contains("key source.address") && error.contains("give its IPv4 address"),
+            "{error}"
+        );
+        assert!(!error.contains('\n'));
+        let unknown = text("10.0.0.7") + "discover = true\n";
+        assert!(read_text(&unknown).is_err());
     }
 
     #[test]

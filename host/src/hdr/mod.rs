@@ -70,10 +70,23 @@ pub fn merge_files(rig: &Rig, files: &[(f64, PathBuf)]) -> Result<Radiance, File
         }
         exposures.push((*exposure_s, raw));
     }
-    let radiance = merge_bracket(&exposures, sensor);
+    merge_checked(&exposures, sensor, first)
+}
+
+/// Merges exposures (seconds, counts) of the same size, and checks that they agree; there must be at
+/// least one. `from` is where they come from.
+///
+/// # Errors
+/// They disagree by more than 5 %.
+pub fn merge_checked(
+    exposures: &[(f64, RawFrame)],
+    sensor: &Sensor,
+    from: &Path,
+) -> Result<Radiance, FileError> {
+    let radiance = merge_bracket(exposures, sensor);
     match radiance.linearity {
         Some(worst) if worst.deviation.abs() > LINEARITY_LIMIT => Err(FileError::new(
-            first,
+            from,
             format_args!(
                 "the exposures of {} s and {} s disagree by {:+.1} %",
                 worst.shorter_s,

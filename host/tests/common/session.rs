@@ -5,6 +5,7 @@ use gonia::dataset::bench_setup::{SessionSettings, Source};
 use gonia::dataset::plan_csv::write_plan_csv;
 use gonia::dataset::rig::Reference;
 use gonia::dataset::rig_toml::write_rig;
+use gonia::session::{Beginning, Claim, ControllerIdentity, Entry, Provenance, SessionWriter};
 use gonia_brdf::{Direction, Pose};
 use std::path::Path;
 
@@ -43,4 +44,37 @@ pub fn small_plan(n: usize) -> Vec<Pose> {
 pub fn write_small(folder: &Path, rig: &Rig, n: usize) {
     write_rig(&folder.join("rig.toml"), rig).unwrap();
     write_plan_csv(&folder.join("plan.csv"), &small_plan(n)).unwrap();
+}
+
+/// Begins a session over the small plan, without controllers.
+#[allow(dead_code)]
+pub fn begin(folder: &Path, rig: &Rig, n: usize) -> SessionWriter {
+    let arm = ControllerIdentity {
+        board: "sim".into(),
+        firmware: String::new(),
+        config_crc: String::new(),
+    };
+    let provenance = Provenance {
+        program: "test".into(),
+        began: String::new(),
+        rig_crc: String::new(),
+        plan_crc: String::new(),
+        reference: rig.session.as_ref().unwrap().reference,
+        camera: "of a test".into(),
+        seed: Some(1),
+        light_arm: arm.clone(),
+        camera_arm: arm,
+    };
+    let text = tempfile::tempdir().unwrap();
+    let path = text.path().join("rig.toml");
+    write_rig(&path, rig).unwrap();
+    let beginning = Beginning {
+        rig: &std::fs::read(path).unwrap(),
+        beside: None,
+        plan: &small_plan(n),
+        provenance: &provenance,
+    };
+    let mut writer = Claim::new(folder, None).unwrap().begin(beginning).unwrap();
+    writer.note(&Entry::Start("test".into())).unwrap();
+    writer
 }

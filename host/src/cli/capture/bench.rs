@@ -4,6 +4,7 @@ use crate::camera::{Camera, CommandCamera, FolderCamera, RenderingCamera};
 use crate::capture::{Arms, Options, Orders, SessionPort};
 use crate::dataset::Rig;
 use crate::dataset::bench_setup::{SessionSettings, Source};
+use crate::dataset::genicam_setup::Genicam;
 use crate::link::{StreamTransport, Transport};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Pose;
@@ -58,6 +59,10 @@ impl Bench {
                 let camera = CommandCamera::new(rig, run.clone(), *timeout_s);
                 real(rig, ports, Box::new(camera), orders)?
             }
+            Some(Source::Genicam(setup)) => {
+                let camera = genicam(rig, setup, settings)?;
+                real(rig, ports, camera, orders)?
+            }
             None => bail!(
                 "{}: has no [source]: say there where the frames come from (docs/session.md), or try --simulated",
                 path.display()
@@ -103,6 +108,19 @@ impl Bench {
         }
         Ok(())
     }
+}
+
+#[cfg(feature = "genicam")]
+fn genicam(rig: &Rig, setup: &Genicam, settings: &SessionSettings) -> Result<Box<dyn Camera>> {
+    let camera = crate::camera::GenicamCamera::open(rig, setup, &settings.exposures_s)?;
+    Ok(Box::new(camera))
+}
+
+#[cfg(not(feature = "genicam"))]
+fn genicam(_: &Rig, _: &Genicam, _: &SessionSettings) -> Result<Box<dyn Camera>> {
+    bail!(
+        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/cameras.md)"
+    )
 }
 
 fn simulated(rig: &Rig, seed: u64, exact: bool, planned: usize, orders: &Orders) -> Result<Bench> {
