@@ -6,7 +6,7 @@ use crate::dataset::samples::read_samples_of_all;
 use crate::evaluate::chart::poses_of;
 use crate::plan::adaptive::{self, Proposal, Reach};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::interpolate::{Calibration, Settings, fill_with_errors, select};
+use gonia_brdf::interpolate::{Calibration, Known, Settings, fill_with_errors, select};
 use gonia_brdf::{Bins, Grid};
 use gonia_protocol::settings::{Axis, Key};
 use std::path::PathBuf;
@@ -38,16 +38,17 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
     let grid = Grid::with_step_deg(STEP_DEG).context("the grid of the error bars")?;
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
+    let known = Known::new(&bins);
     let settings = progress.stage("choosing settings", |_| {
-        anyhow::Ok(select(&bins, Settings::DEFAULT).settings)
+        anyhow::Ok(select(&known, Settings::DEFAULT).settings)
     })?;
     let calibration = progress
         .stage("calibrating error bars", |_| {
-            anyhow::Ok(Calibration::new(&bins, &settings))
+            anyhow::Ok(Calibration::new(&known, &settings))
         })?
         .context("too few frames to calibrate error bars: measure a coarse plan of rings first")?;
     let (dense, bars) = progress.stage("interpolating", |tell| {
-        fill_with_errors(&bins, &settings, &calibration, tell)
+        fill_with_errors(&known, &settings, &calibration, tell)
     })?;
     let relative = bars.relative(&dense);
     let highest = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;
