@@ -71,6 +71,22 @@ pub struct SessionSettings {
     pub max_retries: u32,
     /// The session pauses while the disk has less room than this, MB.
     pub disk_reserve_mb: u64,
+    /// The session pauses while it is colder or warmer than this says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thermometer: Option<Thermometer>,
+}
+
+/// A program that says how warm it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thermometer {
+    /// The program and its arguments. The first word that it prints is a number of degrees Celsius.
+    pub run: Vec<String>,
+    /// The least and the most at which the session goes on, degrees Celsius.
+    pub limits_c: [f64; 2],
+    /// Time between two readings, seconds.
+    #[serde(default = "default_every_s")]
+    pub every_s: f64,
 }
 
 impl Default for SessionSettings {
@@ -83,6 +99,7 @@ impl Default for SessionSettings {
             pause_s: 30.0,
             max_retries: 10,
             disk_reserve_mb: 500,
+            thermometer: None,
         }
     }
 }
@@ -97,6 +114,10 @@ fn default_seed() -> u64 {
 
 fn default_timeout_s() -> f64 {
     10.0
+}
+
+fn default_every_s() -> f64 {
+    60.0
 }
 
 /// Checks that a bench could be as `rig.toml` says.
@@ -174,6 +195,31 @@ pub(super) fn check_bench(
         return refuse(
             "session.pause_s",
             format!("{} s is not possible", session.pause_s),
+            "give seconds from 0 to 86400",
+        );
+    }
+    let Some(thermometer) = &session.thermometer else {
+        return Ok(());
+    };
+    if thermometer.run.is_empty() {
+        return refuse(
+            "session.thermometer.run",
+            "names no program".into(),
+            "give a program that prints degrees Celsius, and its arguments",
+        );
+    }
+    let [least, most] = thermometer.limits_c;
+    if !(least.is_finite() && most.is_finite() && least < most) {
+        return refuse(
+            "session.thermometer.limits_c",
+            format!("{least} to {most} is not possible"),
+            "give the least and the most degrees Celsius",
+        );
+    }
+    if !(0.0..=86_400.0).contains(&thermometer.every_s) {
+        return refuse(
+            "session.thermometer.every_s",
+            format!("{} s is not possible", thermometer.every_s),
             "give seconds from 0 to 86400",
         );
     }
