@@ -225,3 +225,29 @@ pub(super) fn check_bench(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thermometer_needs_a_program_and_limits_between_which_something_is() {
+        let read = |text: &str| toml::from_str::<SessionSettings>(text).unwrap();
+        let settings = read("[thermometer]\nrun = [\"cat\", \"t\"]\nlimits_c = [18, 26.5]\n");
+        assert_eq!(settings.thermometer.as_ref().unwrap().every_s, 60.0);
+        assert!(check_bench(None, None, Some(&settings)).is_ok());
+        for (key, text) in [
+            ("run", "run = []\nlimits_c = [18, 26]"),
+            ("limits_c", "run = [\"t\"]\nlimits_c = [26, 18]"),
+            ("limits_c", "run = [\"t\"]\nlimits_c = [nan, 26]"),
+            (
+                "every_s",
+                "run = [\"t\"]\nlimits_c = [18, 26]\nevery_s = -1",
+            ),
+        ] {
+            let settings = read(&format!("[thermometer]\n{text}\n"));
+            let refused = check_bench(None, None, Some(&settings)).unwrap_err();
+            assert_eq!(refused.key, format!("session.thermometer.{key}"));
+        }
+    }
+}

@@ -6,7 +6,7 @@ use super::thumbnail::Thumbnail;
 use crate::capture::{POINTING_LIMIT_DEG, Pace, Told};
 use crate::dataset::{Rig, Role};
 use crate::process::{Outcome, SampledFrame};
-use crate::session::{End, SessionFolder};
+use crate::session::End;
 use gonia_brdf::Pose;
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -56,7 +56,6 @@ struct LastFrame {
 
 /// What the page shows.
 pub struct Board {
-    rig: Rig,
     title: String,
     plan: Vec<Pose>,
     roles: &'static [Role],
@@ -126,31 +125,27 @@ struct SliceNote {
 }
 
 impl Board {
-    /// Of a session that begins or goes on.
-    pub fn new(session: &SessionFolder) -> Self {
-        let (rig, plan) = (session.rig().clone(), session.plan().to_vec());
-        let folder = session.folder();
-        let name = folder.file_name().unwrap_or(folder.as_os_str());
+    /// Of a session of that name over a plan.
+    pub fn new(title: String, rig: &Rig, plan: &[Pose], roles: &'static [Role]) -> Self {
         Self {
-            title: name.to_string_lossy().into_owned(),
+            title,
             states: vec![(PoseState::ToDo, 0); plan.len()],
-            roles: session.roles(),
-            role: session.roles().first().copied().unwrap_or(Role::Material),
+            roles,
+            role: roles.first().copied().unwrap_or(Role::Material),
             version: 1,
             phase: "homing",
             current: None,
-            pace: Pace::new(plan.len(), session.roles().len()),
+            pace: Pace::new(plan.len(), roles.len()),
             last_deg: 0.0,
             worst_deg: 0.0,
-            filled: Filled::new(&rig, &plan),
+            filled: Filled::new(rig, plan),
             slice_version: 0,
             thumbnail: None,
             drawn: None,
             last: None,
             notes: VecDeque::new(),
             ended: None,
-            rig,
-            plan,
+            plan: plan.to_vec(),
         }
     }
 
@@ -175,23 +170,8 @@ impl Board {
                 self.pace.begin(*role, missing.len(), Instant::now());
             }
             Told::Going { index } => self.current = Some(*index),
-            Told::Frame {
-                frame,
-                registration,
-                sampled,
-            } => {
-                if self.drawn.is_none_or(|at| at.elapsed() >= THUMBNAIL_EVERY) {
-                    self.drawn = Some(Instant::now());
-                    let outcome = sampled.report.outcome;
-                    self.thumbnail = Some(Thumbnail::of(
-                        frame,
-                        registration,
-                        outcome,
-                        &self.rig.target,
-                    ));
-                    self.last = Some(LastFrame::of(sampled, self.version));
-                }
-            }
+            // Drawn by whoever tells, and shown by `show`.
+            Told::Frame { .. } => {}
             Told::Pose { done, frame } => {
                 self.set(
                     done.index,
@@ -224,6 +204,22 @@ impl Board {
             }
             Told::Event(text) => self.note(text),
         }
+    }
+
+    /// Whether a frame should be drawn now; then it is not due for a while.
+    pub fn is_thumbnail_due(&mut self) -> bool {
+        let is_due = self.drawn.is_none_or(|at| at.elapsed() >= THUMBNAIL_EVERY);
+        if is_due {
+            self.drawn = Some(Instant::now());
+        }
+        is_due
+    }
+
+    /// Takes in a frame that was drawn.
+    pub fn show(&mut self, thumbnail: Thumbnail, sampled: &SampledFrame) {
+        self.version += 1;
+        self.thumbnail = Some(thumbnail);
+        self.last = Some(LastFrame::of(sampled, self.version));
     }
 
     /// The session is over.
@@ -350,5 +346,136 @@ impl LastFrame {
             residual_px: report.residual_px,
             offset_deg: [offset.theta_deg, offset.phi_deg],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::Refusal;
+    use crate::session::PoseDone;
+    use crate::session::record::tests::some_frame;
+    use crate::vision::Reason;
+    use gonia_brdf::Direction;
+    use serde_json::Value;
+
+    fn board() -> Board {
+        let pose = |k: usize| Pose {
+            light: Direction::from_deg(15.0, 10.0 * k as f64),
+            view: Direction::from_deg(30.0, 0.0),
+        };
+        let plan: Vec<Pose> = (0..5).map(pose).collect();
+        let mut board = Board::new(
+            "silk".into(),
+            &Rig::paper(100),
+            &plan,
+            &[Role::Reference, Role::Material],
+        );
+        board.hear(&Told::Begin {
+            role: Role::Reference,
+            missing: &[1, 2, 3, 4],
+            planned: 5,
+        });
+        board
+    }
+
+    fn done(board: &mut Board, index: u32, outcome: Outcome) {
+        let mut frame = some_frame(index, Role::Reference);
+        frame.report.outcome = outcome;
+        let done = PoseDone {
+            role: Role::Reference,
+            index: index as usize,
+            at: 0,
+            bytes: 0,
+            crc: 0,
+            pointing_deg: 0.001 * f64::from(index),
+        };
+        board.hear(&Told::Pose {
+            done: &done,
+            frame: &frame,
+        });
+    }
+
+    fn update(board: &Board, since: u64) -> (u64, Value) {
+        let (version, text) = board.update(since, false, false);
+        (version, serde_json::from_str(&text).unwrap())
+    }
+
+    #[test]
+    fn a_browser_is_sent_everything_once_and_then_what_has_changed() {
+        let mut board = board();
+        let (first, whole) = update(&board, 0);
+        assert_eq!(whole["whole"]["plan"].as_array().unwrap().len(), 5);
+        assert_eq!(whole["poses"], serde_json::json!([[0, 1]]));
+        assert_eq!(whole["done"], 1);
+
+        done(&mut board, 2, Outcome::Locked);
+        let lost = Reason::LinesMissing { found: 1 };
+        done(&mut board, 3, Outcome::Refused(Refusal::NotTheTarget(lost)));
+        board.hear(&Told::GivenUp {
+            index: 4,
+            why: "reference pose 4: too far",
+        });
+        let (second, changed) = update(&board, first);
+        assert!(changed.get("whole").is_none());
+        assert_eq!(
+            changed["poses"],
+            serde_json::json!([[2, 1], [3, 3], [4, 4]])
+        );
+        assert_eq!(
+            (&changed["done"], &changed["worst_deg"]),
+            (&3.into(), &0.003.into())
+        );
+        assert_eq!(changed["notes"][0]["text"], "reference pose 4: too far");
+        // A slow one, which has seen only the beginning, is sent the same and what came after.
+        board.hear(&Told::Void(&[2]));
+        assert_eq!(
+            update(&board, second).1["poses"],
+            serde_json::json!([[2, 0]])
+        );
+        let slow = update(&board, first).1;
+        assert_eq!(slow["poses"], serde_json::json!([[2, 0], [3, 3], [4, 4]]));
+        assert_eq!(slow["notes"].as_array().unwrap().len(), 1);
+        assert_eq!(slow["done"], 2);
+    }
+
+    #[test]
+    fn another_role_begins_with_an_empty_map_and_the_end_says_how() {
+        let mut board = board();
+        let (version, _) = update(&board, 0);
+        board.hear(&Told::Begin {
+            role: Role::Material,
+            missing: &[0, 1, 2, 3, 4],
+            planned: 5,
+        });
+        board.hear(&Told::Held(true));
+        let (_, begun) = update(&board, version);
+        assert_eq!(
+            (&begun["role"], &begun["phase"]),
+            (&"material".into(), &"held".into())
+        );
+        assert!(begun["poses"].as_array().unwrap().iter().all(|p| p[1] == 0));
+        board.end(End::Failed, "the lamp is out");
+        let (_, ended) = update(&board, 0);
+        assert_eq!(
+            ended["ended"],
+            serde_json::json!(["failed", "the lamp is out"])
+        );
+    }
+
+    #[test]
+    fn the_oldest_notes_go_and_a_plan_never_grows() {
+        let mut board = board();
+        for k in 0..1000 {
+            board.hear(&Told::Event(&format!("event {k}")));
+        }
+        done(&mut board, 77, Outcome::Locked);
+        let (_, whole) = update(&board, 0);
+        let notes = whole["notes"].as_array().unwrap();
+        assert_eq!(
+            (notes.len(), &notes[0]["text"]),
+            (NOTES, &"event 800".into())
+        );
+        assert_eq!(board.states.len(), 5);
     }
 }

@@ -110,9 +110,9 @@
     return (s / 3600).toFixed(1) + " h";
   }
   function show() {
-    const n = now, pausing = n.held && n.phase === "measuring";
-    const word = n.ended ? n.ended[0] : pausing ? "pausing" : n.phase;
-    put("phase", n.ended ? "ended: " + word : pausing ? "pausing at the next pose" : word);
+    const n = now, soon = n.phase !== "measuring" ? "" : n.ends ? "ending" : n.held ? "pausing" : "";
+    const word = n.ended ? n.ended[0] : soon || n.phase;
+    put("phase", n.ended ? "ended: " + word : soon ? soon + " at the next pose" : word);
     el("phase").className = "pill " + word;
     put("what", whole.roles.length > 1 ? n.role + " of " + whole.roles.join(", then ") : n.role);
     el("reason").hidden = !n.ended;

@@ -3,8 +3,10 @@
 use super::board::Board;
 use super::guard::{Guard, random_hex};
 use super::page;
+use super::thumbnail::Thumbnail;
 use crate::capture::{Orders, Told, Watch};
 use crate::dataset::FileError;
+use crate::dataset::rig::Target;
 use crate::session::{End, SessionFolder};
 use axum::Router;
 use axum::body::Body;
@@ -111,6 +113,7 @@ impl Shared {
 /// A live page that is being served. It ends with this value.
 pub struct LivePage {
     shared: Arc<Shared>,
+    target: Target,
     address: SocketAddr,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -128,7 +131,10 @@ impl LivePage {
         orders: &Orders,
     ) -> Result<Self, LiveError> {
         let system = |error: &dyn std::fmt::Display| LiveError::System(error.to_string());
-        let mut board = Board::new(session);
+        let folder = session.folder();
+        let name = folder.file_name().unwrap_or(folder.as_os_str());
+        let title = name.to_string_lossy().into_owned();
+        let mut board = Board::new(title, session.rig(), session.plan(), session.roles());
         for pose in session.done() {
             board.remember(&session.frame(pose)?);
         }
@@ -165,6 +171,7 @@ impl LivePage {
             .map_err(|e| system(&e))?;
         Ok(Self {
             shared,
+            target: session.rig().target.clone(),
             address,
             stop: Some(stop),
             thread: Some(thread),
@@ -189,7 +196,21 @@ impl LivePage {
 
 impl Watch for LivePage {
     fn tell(&self, news: &Told) {
-        self.shared.change(|board| board.hear(news));
+        if let Told::Frame {
+            frame,
+            registration,
+            sampled,
+        } = news
+        {
+            // Drawn while nobody waits for the board.
+            if self.shared.board().is_thumbnail_due() {
+                let outcome = sampled.report.outcome;
+                let thumbnail = Thumbnail::of(frame, registration, outcome, &self.target);
+                self.shared.change(|board| board.show(thumbnail, sampled));
+            }
+        } else {
+            self.shared.change(|board| board.hear(news));
+        }
     }
 }
 

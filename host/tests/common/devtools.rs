@@ -89,6 +89,7 @@ impl Page {
             json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         page.command("Emulation.setDeviceMetricsOverride", size);
         page.command("Page.navigate", json!({"url": address}));
+        page.until("document.readyState === 'complete'");
         page
     }
 

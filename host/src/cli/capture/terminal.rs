@@ -11,7 +11,7 @@ use crate::session::SessionFolder;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Plain lines, and pictures of the last frame, come no more often than this.
@@ -41,6 +41,7 @@ struct State {
     printed: Instant,
     /// When the last frame was drawn.
     drawn: Option<Instant>,
+    has_picture: bool,
 }
 
 impl Terminal {
@@ -76,6 +77,7 @@ impl Terminal {
                 events: 0,
                 printed: Instant::now(),
                 drawn: None,
+                has_picture: false,
             }),
         }
     }
@@ -93,6 +95,31 @@ impl Terminal {
         }
     }
 
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_picture_due(&self) -> bool {
+        let mut state = self.state();
+        let is_due = state.drawn.is_none_or(|at| at.elapsed() >= LINE_EVERY);
+        if is_due {
+            state.drawn = Some(Instant::now());
+        }
+        is_due
+    }
+
+    fn keep_picture(&self, picture: &Thumbnail) {
+        // A disk that does not take it is found out by the frames.
+        let written = write_whole_bytes(&self.last_frame, &picture.png());
+        let mut state = self.state();
+        if written.is_ok() && !state.has_picture {
+            state.has_picture = true;
+            if self.plain {
+                eprintln!("last frame: {}", self.last_frame.display());
+            }
+        }
+    }
+
     fn event(&self, state: &mut State, text: &str) {
         state.events += 1;
         self.line(text);
@@ -104,7 +131,7 @@ impl Terminal {
             lines = state.map.lines(state.current);
         }
         lines.push(figures(state));
-        if state.drawn.is_some() {
+        if state.has_picture {
             lines.push(format!("last frame: {}", self.last_frame.display()));
         }
         self.bar.set_message(lines.join("\n"));
@@ -128,7 +155,18 @@ fn figures(state: &State) -> String {
 
 impl Watch for Terminal {
     fn tell(&self, news: &Told) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Told::Frame {
+            frame,
+            registration,
+            sampled,
+        } = news
+            && self.is_picture_due()
+        {
+            // Not while others wait for the state: the arms are among them.
+            let outcome = sampled.report.outcome;
+            self.keep_picture(&Thumbnail::of(frame, registration, outcome, &self.target));
+        }
+        let mut state = self.state();
         match news {
             Told::Begin {
                 role,
@@ -146,24 +184,7 @@ impl Watch for Terminal {
                 ));
             }
             Told::Going { index } => state.current = Some(*index),
-            Told::Frame {
-                frame,
-                registration,
-                sampled,
-            } => {
-                if state.drawn.is_none_or(|at| at.elapsed() >= LINE_EVERY) {
-                    let outcome = sampled.report.outcome;
-                    let thumbnail = Thumbnail::of(frame, registration, outcome, &self.target);
-                    // A disk that does not take it is found out by the frames.
-                    let written = write_whole_bytes(&self.last_frame, &thumbnail.png());
-                    if written.is_ok() {
-                        if self.plain && state.drawn.is_none() {
-                            eprintln!("last frame: {}", self.last_frame.display());
-                        }
-                        state.drawn = Some(Instant::now());
-                    }
-                }
-            }
+            Told::Frame { .. } => return,
             Told::Pose { done, frame } => {
                 let mark = match frame.report.outcome {
                     Outcome::Refused(_) => Mark::Bad,
