@@ -141,7 +141,7 @@
     if (n.slice.filled > 0) {
       picture("slice", "slice.png", n.slice.version);
       put("slice-what", "θi = " + n.slice.theta_deg[0] + "°, θv = " + n.slice.theta_deg[1] + "°; φ of the view to the right, of the light upwards, 0 to 360°. "
-        + (100 * n.slice.filled).toFixed(1) + " % of its bins are filled; paler: the nearest of them. Relative, under an ideal light.");
+        + (100 * n.slice.filled).toFixed(1) + " % of its bins are filled; dimmed: the nearest of them. Relative, under an ideal light.");
     }
     document.title = count(n.done) + " of " + count(n.planned) + " – " + whole.title + " – gonia";
     drawAll();

@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 
 /// Of the elevations of a plan the slice is at the one nearest to this, degrees.
 const LIKED_DEG: f64 = 30.0;
-/// An empty bin shows the nearest filled one within this many bins, and paler.
+/// An empty bin shows the nearest filled one within this many bins, dimmed.
 const REACH: i32 = 8;
-const PALE: u8 = 130;
+const DIMMED: u8 = 130;
 /// The brightest bins that may be clipped, as a share.
 const CLIPPED: f64 = 0.02;
 
@@ -85,7 +85,7 @@ impl Slice {
                     None => [0; 4],
                     Some(from) => {
                         let [r, g, b] = tone::rgb8(self.mean(from), exposure);
-                        [r, g, b, if from == at { 255 } else { PALE }]
+                        [r, g, b, if from == at { 255 } else { DIMMED }]
                     }
                 });
             }
