@@ -9,6 +9,7 @@ pub mod dataset;
 pub mod evaluate;
 pub mod hdr;
 pub mod link;
+pub mod live;
 pub mod plan;
 pub mod process;
 pub mod report;

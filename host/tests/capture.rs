@@ -251,6 +251,49 @@ fn ctrl_c_ends_a_session_at_the_next_pose_and_a_second_capture_is_kept_out() {
     assert!(verdict.done < 800);
 }
 
+#[test]
+#[cfg(target_os = "linux")]
+fn a_disk_that_takes_nothing_for_a_while_costs_no_pose() {
+    use std::io::{BufRead, BufReader};
+    let alone = tempfile::tempdir().unwrap();
+    write_small(alone.path(), &small_rig(), 20);
+    let output = start(alone.path(), false).wait_with_output().unwrap();
+    assert!(output.status.success());
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().max_retries = 30;
+    write_small(folder.path(), &rig, 20);
+    // Files may grow to 32 kB: what is beyond it the system refuses, in the middle of a frame.
+    let script = "trap '' XFSZ; ulimit -S -f 64; exec \"$0\" \"$@\"";
+    let mut child = Command::new("sh")
+        .current_dir(folder.path())
+        .args(["-c", script, env!("CARGO_BIN_EXE_gonia")])
+        .args(["capture", "s", "--rig", "rig.toml", "--plan", "plan.csv"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let refused = lines
+        .by_ref()
+        .map(Result::unwrap)
+        .find(|line| line.contains("frames.bin"));
+    assert!(refused.unwrap().contains("pose "));
+    let raised = Command::new("prlimit")
+        .args(["--fsize=unlimited", "--pid", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(raised.success());
+    let rest: Vec<String> = lines.map(Result::unwrap).collect();
+    assert!(child.wait().unwrap().success(), "{rest:?}");
+    let s = folder.path().join("s");
+    let verdict = verify(&s).unwrap();
+    assert_eq!((verdict.done, verdict.broken().count()), (40, 0));
+    let samples = |folder: &Path| std::fs::read(folder.join("s/samples.npy")).unwrap();
+    assert!(samples(folder.path()) == samples(alone.path()));
+}
+
 /// The simulated controllers and the camera, in real time, in a process of their own; they end with
 /// this value.
 #[cfg(unix)]
@@ -264,13 +307,11 @@ impl Drop for Bench {
     }
 }
 
-#[test]
+/// A bench in real time beside a session over so many poses in a folder: what `capture` is started with.
 #[cfg(unix)]
-#[ignore = "minutes: arms in real time"]
-fn controllers_that_outlive_a_killed_host_are_taken_up_again() {
+fn real_bench(folder: &Path, poses: usize) -> (Bench, Vec<String>) {
     use std::io::{BufRead, BufReader};
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     std::fs::create_dir(at("incoming")).unwrap();
     let mut rig = small_rig();
     rig.source = Some(gonia::dataset::bench_setup::Source::Folder {
@@ -278,27 +319,121 @@ fn controllers_that_outlive_a_killed_host_are_taken_up_again() {
         timeout_s: 10.0,
     });
     rig.session.as_mut().unwrap().reference = false;
-    write_small(folder.path(), &rig, 24);
+    write_small(folder, &rig, poses);
+    let (incoming, rig) = (at("incoming"), at("rig.toml"));
     let mut bench = Command::new(env!("CARGO_BIN_EXE_gonia"))
-        .args([
-            "sim-device",
-            "--frames",
-            &at("incoming"),
-            "--rig",
-            &at("rig.toml"),
-        ])
+        .args(["sim-device", "--frames", &incoming, "--rig", &rig])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
     let mut lines = BufReader::new(bench.stdout.take().unwrap()).lines();
-    let _bench = Bench(bench);
-    let ports = ["light arm", "camera arm"].map(|name| {
+    let bench = Bench(bench);
+    let [light, camera] = ["light arm", "camera arm"].map(|name| {
         let line = lines.next().unwrap().unwrap();
         line.strip_prefix(name).unwrap().trim().to_owned()
     });
-    let (s, rig, plan) = (at("s"), at("rig.toml"), at("plan.csv"));
-    let mut command = vec!["capture", &s, "--rig", &rig, "--plan", &plan, "--resume"];
-    command.extend(["--light", &ports[0], "--camera-arm", &ports[1]]);
+    let (s, plan) = (at("s"), at("plan.csv"));
+    let mut command = vec!["capture".into(), s, "--rig".into(), rig];
+    command.extend(["--plan".into(), plan, "--resume".into()]);
+    command.extend(["--light".into(), light, "--camera-arm".into(), camera]);
+    (bench, command)
+}
+
+#[test]
+#[cfg(unix)]
+fn a_second_ctrl_c_stops_moving_arms_now_and_other_settings_are_refused_afterwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_bench, command) = real_bench(folder.path(), 4);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gonia"))
+        .args(&command)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let light = command[command.len() - 3].as_str();
+    let journal = folder.path().join("s/journal.log");
+    let began = Instant::now();
+    while !journal.exists() {
+        assert!(began.elapsed() < Duration::from_secs(20));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // Homing takes far longer than this test.
+    std::thread::sleep(Duration::from_secs(2));
+    let interrupt = |child: &Child| {
+        let id = child.id().to_string();
+        assert!(
+            Command::new("kill")
+                .args(["-INT", &id])
+                .status()
+                .unwrap()
+                .success()
+        );
+    };
+    interrupt(&child);
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(
+        child.try_wait().unwrap().is_none(),
+        "one Ctrl-C stopped the arms"
+    );
+    interrupt(&child);
+    let told = Instant::now();
+    let output = child.wait_with_output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(told.elapsed() < Duration::from_secs(3), "{errors}");
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("by Ctrl-C, while homing"), "{errors}");
+    let last = std::fs::read_to_string(&journal).unwrap();
+    assert!(
+        last.lines().last().unwrap().contains("stop paused"),
+        "{last}"
+    );
+    // They slow down, and do not go on homing; a lease that ran out would be a fault.
+    std::thread::sleep(Duration::from_secs(1));
+    let status = gonia_ok(&["device", light, "status"], "");
+    assert!(status.contains("state  unhomed"), "{status}");
+
+    // Somebody turns a screw in between.
+    gonia_ok(
+        &["device", light, "set", "theta", "max_speed", "14000000"],
+        "",
+    );
+    let output = gonia(&command.iter().map(String::as_str).collect::<Vec<_>>(), "");
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    let said: Vec<&str> = errors
+        .lines()
+        .filter(|l| l.starts_with("gonia: "))
+        .collect();
+    let [line] = said[..] else {
+        panic!("{errors}");
+    };
+    assert!(
+        line.contains("light arm: its settings (") && line.contains("restore them"),
+        "{line}"
+    );
+    // With the settings it began with it is not refused; it homes again, and that is enough here.
+    gonia_ok(
+        &["device", light, "set", "theta", "max_speed", "15000000"],
+        "",
+    );
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gonia"))
+        .args(&command)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(child.try_wait().unwrap().is_none(), "it was refused");
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+#[cfg(unix)]
+#[ignore = "minutes: arms in real time"]
+fn controllers_that_outlive_a_killed_host_are_taken_up_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_bench, command) = real_bench(folder.path(), 24);
     // While homing, and then in the middle of moves and exposures.
     for seconds in [8.0, 45.0, 7.3, 9.1] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_gonia"))
@@ -311,9 +446,9 @@ fn controllers_that_outlive_a_killed_host_are_taken_up_again() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    let table = gonia_ok(&command, "");
+    let table = gonia_ok(&command.iter().map(String::as_str).collect::<Vec<_>>(), "");
     println!("{table}");
-    let verdict = verify(Path::new(&s)).unwrap();
+    let verdict = verify(&folder.path().join("s")).unwrap();
     assert_eq!((verdict.done, verdict.kills), (24, 4));
     assert_eq!(verdict.broken().count(), 0);
     assert!(verdict.max_pointing_deg <= 0.03);

@@ -9,7 +9,7 @@ mod session;
 use common::{gonia_ok, text};
 use gonia::camera::simulated_gige::{GigeError, GigeTrouble, GigeTroubles};
 use gonia::camera::{Camera, CameraError, GenicamCamera, RenderingCamera, SimulatedGige};
-use gonia::capture::{Arms, Capture, Ended, Orders, Told, Watch};
+use gonia::capture::{Arms, Capture, Ended, Orders, Told, Watch, free_mb};
 use gonia::dataset::bench_setup::Source;
 use gonia::dataset::genicam_setup::{Exposure, Genicam};
 use gonia::dataset::rig::{Bayer, Reference, Sensor};
@@ -122,6 +122,7 @@ fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camer
         exact: false,
         orders: &orders,
         watch: &Nobody,
+        free_mb: &free_mb,
     };
     capture.run(&mut arms, camera, writer, &session).unwrap()
 }

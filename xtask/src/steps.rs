@@ -87,16 +87,17 @@ pub fn test() -> Result<()> {
         );
     }
     if install("chromium", "chromium") {
-        table.step("the report in a browser", || {
+        table.step("report and live page in a browser", || {
             run(cargo(&root)
                 .args(["test", "--workspace", "--test", "browser"])
                 .args(features)
+                .args(["--test", "browser_live"])
                 .args(["--", "--ignored"])
                 .env("GONIA_BROWSER", "chromium"))
         })?;
     } else {
         table.not_run(
-            "the report in a browser",
+            "report and live page in a browser",
             "chromium is missing: apt-get install chromium",
         );
     }

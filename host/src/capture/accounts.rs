@@ -9,8 +9,11 @@ use crate::session::{Entry, SessionWriter};
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::mpsc::{Receiver, Sender, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::time::{Duration, Instant};
+
+/// How often an order to stop is looked for while the camera works.
+const LISTEN_EVERY: Duration = Duration::from_millis(50);
 
 /// Why a session ends before its last pose.
 #[derive(Clone, Debug, PartialEq)]
@@ -200,8 +203,14 @@ impl<'a> Accounts<'a> {
             if let Some(result) = self.fetched.take() {
                 return Ok(result);
             }
-            let news = self.news.recv().map_err(|_| ended_early())?;
-            self.hear(news)?;
+            match self.news.recv_timeout(LISTEN_EVERY) {
+                Ok(news) => self.hear(news)?,
+                Err(RecvTimeoutError::Disconnected) => return Err(ended_early()),
+                Err(RecvTimeoutError::Timeout) if self.orders.stops() => {
+                    return Err(Halt::Stopped("by a second Ctrl-C".into()));
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
         }
     }
 
@@ -250,7 +259,8 @@ impl<'a> Accounts<'a> {
                 }
             }
             if self.orders.ends() {
-                return Err(Halt::Paused("by Ctrl-C, while the camera was away".into()));
+                let by = self.orders.ended_by();
+                return Err(Halt::Paused(format!("{by}, while the camera was away")));
             }
         }
         Ok(())

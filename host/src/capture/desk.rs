@@ -8,6 +8,7 @@ use crate::dataset::frame_exr::write_frame;
 use crate::dataset::{FileError, Frame, FrameRow, Role};
 use crate::process::{FrameSampler, Hidden, Outcome, SampledFrame};
 use crate::session::{PoseDone, SessionWriter};
+use crate::vision::Registration;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -84,6 +85,13 @@ pub fn fetch_all(
     }
 }
 
+/// A frame, and what it shows.
+struct Looked {
+    frame: Frame,
+    registration: Registration,
+    sampled: SampledFrame,
+}
+
 /// Samples and keeps frames.
 pub struct Desk<'a> {
     /// Of the session's rig.
@@ -103,7 +111,7 @@ pub struct Desk<'a> {
 impl Desk<'_> {
     /// Works until there is no more work.
     pub fn work(&mut self, work: &Receiver<Work>, news: &Sender<News>) {
-        let mut held: Option<(Taken, SampledFrame, Frame)> = None;
+        let mut held: Option<(Taken, Looked)> = None;
         for item in work {
             match item {
                 Work::Frame(taken, frame) => {
@@ -111,13 +119,19 @@ impl Desk<'_> {
                         Role::Material if self.has_reference => Hidden::Known(None),
                         _ => Hidden::Find,
                     };
-                    let sampled = self.sampler.sample(&frame, &taken.row, hidden);
-                    held = Some((taken, sampled, frame));
+                    let (sampled, registration) =
+                        self.sampler.sample_registered(&frame, &taken.row, hidden);
+                    let looked = Looked {
+                        frame,
+                        registration,
+                        sampled,
+                    };
+                    held = Some((taken, looked));
                 }
                 Work::Void => held = None,
                 Work::Confirm => {
-                    if let Some((taken, sampled, frame)) = held.take()
-                        && news.send(self.take_in(taken, &sampled, &frame)).is_err()
+                    if let Some((taken, looked)) = held.take()
+                        && news.send(self.take_in(taken, &looked)).is_err()
                     {
                         return;
                     }
@@ -126,7 +140,13 @@ impl Desk<'_> {
         }
     }
 
-    fn take_in(&mut self, taken: Taken, sampled: &SampledFrame, frame: &Frame) -> News {
+    fn take_in(&mut self, taken: Taken, looked: &Looked) -> News {
+        let Looked { frame, sampled, .. } = looked;
+        self.watch.tell(&Told::Frame {
+            frame,
+            registration: &looked.registration,
+            sampled,
+        });
         let is_locked = sampled.report.outcome == Outcome::Locked;
         if taken.task.is_control {
             let first = self.baseline.as_ref().filter(|_| is_locked);

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 #[derive(Clone, Debug, Default)]
 pub struct Orders {
     interrupts: Arc<AtomicU32>,
+    ended: Arc<AtomicBool>,
     held: Arc<AtomicBool>,
 }
 
@@ -16,9 +17,23 @@ impl Orders {
         self.interrupts.fetch_add(1, Ordering::SeqCst);
     }
 
+    /// Ends the session at the next pose, as the first Ctrl-C does; however often it is said.
+    pub fn end(&self) {
+        self.ended.store(true, Ordering::SeqCst);
+    }
+
     /// Whether the session ends at the next pose.
     pub fn ends(&self) -> bool {
-        self.interrupts.load(Ordering::SeqCst) > 0
+        self.ended.load(Ordering::SeqCst) || self.interrupts.load(Ordering::SeqCst) > 0
+    }
+
+    /// By what it was told to.
+    pub fn ended_by(&self) -> &'static str {
+        if self.interrupts.load(Ordering::SeqCst) > 0 {
+            "by Ctrl-C"
+        } else {
+            "from the live page"
+        }
     }
 
     /// Whether the arms stop now.

@@ -14,7 +14,7 @@ use crate::dataset::{FileError, FrameRow, Rig, Role};
 use crate::process::{FrameSampler, Outcome, SampledFrame};
 use crate::session::{End, Entry, SessionFolder, SessionWriter};
 use gonia_brdf::Pose;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, mpsc};
 use std::time::{Duration, Instant};
 
@@ -22,8 +22,8 @@ use std::time::{Duration, Instant};
 const FRAMES_IN_MEMORY: usize = 2;
 /// How often a pose that the arms do not reach comes round again.
 const ROUNDS: u32 = 2;
-/// Arms that rest listen to orders this often, µs.
-const REST_US: u64 = 200_000;
+/// Arms that are held listen to orders this often.
+const LISTEN_EVERY: Duration = Duration::from_millis(50);
 
 /// Why a session ends between reference and material.
 const CHANGE_THE_SAMPLE: &str =
@@ -43,6 +43,8 @@ pub struct Capture<'a> {
     pub orders: &'a Orders,
     /// Who watches.
     pub watch: &'a dyn Watch,
+    /// Says how much room the disk of a folder has, MB; [`free_mb`](super::free_mb) does.
+    pub free_mb: &'a (dyn Fn(&Path) -> Option<u64> + Sync),
 }
 
 /// How it ended.
@@ -98,7 +100,7 @@ impl Capture<'_> {
             }
             self.watch.tell(&Told::Begin {
                 role: *role,
-                done: session.plan().len() - missing.len(),
+                missing: &missing,
                 planned: session.plan().len(),
             });
             let measuring = Measuring {
@@ -149,7 +151,7 @@ impl Capture<'_> {
     fn home(&self, shooter: &mut Shooter) -> Result<(), Halt> {
         shooter.take_up().map_err(|error| {
             if self.orders.ends() {
-                return Halt::Stopped("by Ctrl-C, while homing".into());
+                return Halt::Stopped(format!("{}, while homing", self.orders.ended_by()));
             }
             Halt::Failed(error.to_string())
         })
@@ -185,8 +187,8 @@ fn baseline_of(
 }
 
 /// One role of a session.
-struct Measuring<'a> {
-    capture: &'a Capture<'a>,
+pub(super) struct Measuring<'a> {
+    pub(super) capture: &'a Capture<'a>,
     plan: &'a [Pose],
     role: Role,
     has_reference: bool,
@@ -260,11 +262,15 @@ impl Measuring<'_> {
         if accounts.control.is_some() {
             self.check_control(shooter, accounts, good_line)?;
         }
+        let mut look_us = 0;
         loop {
             accounts.listen()?;
             self.obey(shooter, accounts)?;
             self.wait_for_room(shooter, accounts)?;
-            let due = accounts.since_control.len() >= self.capture.settings.control_every;
+            let was_out = self.wait_for_temperature(shooter, accounts, &mut look_us)?;
+            // What it has done to the lamp, the control pose tells.
+            let due =
+                was_out || accounts.since_control.len() >= self.capture.settings.control_every;
             if due || accounts.queue.is_empty() {
                 accounts.settle()?;
                 accounts.clear_desk()?;
@@ -287,15 +293,21 @@ impl Measuring<'_> {
     }
 
     /// What a person wants.
-    fn obey(&self, shooter: &mut Shooter, accounts: &mut Accounts) -> Result<(), Halt> {
+    pub(super) fn obey(&self, shooter: &mut Shooter, accounts: &mut Accounts) -> Result<(), Halt> {
         let orders = self.capture.orders;
         if orders.is_held() {
             accounts.event("held by hand");
+            accounts.watch.tell(&Told::Held(true));
             let began = Instant::now();
             while orders.is_held() && !orders.ends() {
-                std::thread::sleep(Duration::from_micros(REST_US / 4));
+                std::thread::sleep(LISTEN_EVERY);
+                // What the controllers say meanwhile is read; what is wrong with them comes out at
+                // the next move.
+                let _ = shooter.arms().light().rest(1);
+                let _ = shooter.arms().camera().rest(1);
             }
             accounts.paused += began.elapsed();
+            accounts.watch.tell(&Told::Held(false));
             accounts.event("goes on");
         }
         if orders.stops() {
@@ -304,7 +316,7 @@ impl Measuring<'_> {
             return Err(Halt::Stopped("by a second Ctrl-C".into()));
         }
         if orders.ends() {
-            return Err(Halt::Paused("by Ctrl-C".into()));
+            return Err(Halt::Paused(orders.ended_by().into()));
         }
         Ok(())
     }
@@ -320,6 +332,7 @@ impl Measuring<'_> {
         let Some(pose) = self.plan.get(task.index) else {
             return Ok(());
         };
+        self.capture.watch.tell(&Told::Going { index: task.index });
         let mut halt = None;
         let taken = shooter.take(task.index, pose, &mut || {
             accounts.before_trigger().map_err(|why| {
@@ -363,7 +376,10 @@ impl Measuring<'_> {
                     let tries = task.tries + 1;
                     accounts.queue.push_back(Task { tries, ..task });
                 } else {
-                    accounts.watch.tell(&Told::Event(&text));
+                    accounts.watch.tell(&Told::GivenUp {
+                        index: task.index,
+                        why: &text,
+                    });
                     let _ = lock(accounts.writer).note(&Entry::GivenUp(text));
                     totals.given_up += 1;
                 }
@@ -482,6 +498,7 @@ impl Measuring<'_> {
         let noted = lock(accounts.writer).note(&Entry::Void(good_line, why.to_owned()));
         noted.map_err(|error| Halt::Failed(error.to_string()))?;
         let voided = std::mem::take(&mut accounts.since_control);
+        accounts.watch.tell(&Told::Void(&voided));
         accounts.event(&format!(
             "{} poses since the last control are taken again",
             voided.len()
@@ -495,52 +512,4 @@ impl Measuring<'_> {
         }
         Ok(())
     }
-
-    /// Waits while the disk is nearly full.
-    fn wait_for_room(&self, shooter: &mut Shooter, accounts: &mut Accounts) -> Result<(), Halt> {
-        let settings = self.capture.settings;
-        for tries in 0.. {
-            // The writer itself may be waiting for the disk, and the arms do not wait for that.
-            let Some(free_mb) = free_mb(&accounts.folder) else {
-                return Ok(());
-            };
-            if free_mb >= settings.disk_reserve_mb {
-                return Ok(());
-            }
-            let text = format!(
-                "the disk has {free_mb} MB left, and {} MB are reserved",
-                settings.disk_reserve_mb
-            );
-            if tries >= settings.max_retries {
-                return Err(Halt::Failed(format!(
-                    "{text}: free some, and go on with --resume"
-                )));
-            }
-            accounts.event(&text);
-            self.rest(shooter, accounts)?;
-        }
-        Ok(())
-    }
-
-    /// A pause by the arms' clock, in which orders are heard.
-    fn rest(&self, shooter: &mut Shooter, accounts: &mut Accounts) -> Result<(), Halt> {
-        let began = Instant::now();
-        let until_us = shooter.arms().now_us() + (self.capture.settings.pause_s * 1e6) as u64;
-        while shooter.arms().now_us() < until_us {
-            self.obey(shooter, accounts)?;
-            let left_us = until_us.saturating_sub(shooter.arms().now_us());
-            let rested = shooter.arms().light().rest(left_us.min(REST_US));
-            if let Err(error) = rested {
-                return Err(Halt::Failed(error.to_string()));
-            }
-        }
-        accounts.paused += began.elapsed();
-        Ok(())
-    }
-}
-
-/// Room on the disk of a folder, MB; `None` where the system does not say.
-fn free_mb(folder: &std::path::Path) -> Option<u64> {
-    let disk = rustix::fs::statvfs(folder).ok()?;
-    Some(disk.f_bavail.saturating_mul(disk.f_frsize) / 1_000_000)
 }

@@ -1,10 +1,11 @@
 //! What a running session tells those who watch it.
 
-use crate::dataset::Role;
+use crate::dataset::{Frame, Role};
 use crate::process::SampledFrame;
 use crate::session::PoseDone;
+use crate::vision::Registration;
 
-/// Somebody who watches; called from several threads.
+/// Somebody who watches; called from several threads, which wait for it: it must be quick.
 pub trait Watch: Sync {
     /// Hears what happened.
     fn tell(&self, news: &Told);
@@ -13,14 +14,28 @@ pub trait Watch: Sync {
 /// What happened.
 #[derive(Clone, Debug)]
 pub enum Told<'a> {
-    /// A role begins, or goes on: so many of its poses are done.
+    /// A role begins, or goes on.
     Begin {
         /// What lies on the target.
         role: Role,
-        /// Poses done.
-        done: usize,
+        /// Poses of the plan that are not done.
+        missing: &'a [usize],
         /// Poses planned.
         planned: usize,
+    },
+    /// The arms go to a pose.
+    Going {
+        /// Its place in the plan.
+        index: usize,
+    },
+    /// A frame was looked at, also one that is not kept.
+    Frame {
+        /// Its pixels.
+        frame: &'a Frame,
+        /// Where its marks are.
+        registration: &'a Registration,
+        /// What it showed.
+        sampled: &'a SampledFrame,
     },
     /// A pose is done.
     Pose {
@@ -29,6 +44,28 @@ pub enum Told<'a> {
         /// What it showed.
         frame: &'a SampledFrame,
     },
+    /// Poses are done no more, and are taken again.
+    Void(&'a [usize]),
+    /// A pose was given up.
+    GivenUp {
+        /// Its place in the plan.
+        index: usize,
+        /// Why.
+        why: &'a str,
+    },
+    /// The session is held by hand, or goes on.
+    Held(bool),
     /// Something that a person should know.
     Event(&'a str),
+}
+
+/// Several who watch.
+pub struct Watchers<'a>(pub Vec<&'a dyn Watch>);
+
+impl Watch for Watchers<'_> {
+    fn tell(&self, news: &Told) {
+        for watch in &self.0 {
+            watch.tell(news);
+        }
+    }
 }

@@ -75,6 +75,22 @@ pub struct SessionSettings {
     pub max_retries: u32,
     /// The session pauses while the disk has less room than this, MB.
     pub disk_reserve_mb: u64,
+    /// The session pauses while it is colder or warmer than this says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thermometer: Option<Thermometer>,
+}
+
+/// A program that says how warm it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thermometer {
+    /// The program and its arguments. The first word that it prints is a number of degrees Celsius.
+    pub run: Vec<String>,
+    /// The least and the most at which the session goes on, degrees Celsius.
+    pub limits_c: [f64; 2],
+    /// Time between two readings, seconds.
+    #[serde(default = "default_every_s")]
+    pub every_s: f64,
 }
 
 impl Default for SessionSettings {
@@ -87,6 +103,7 @@ impl Default for SessionSettings {
             pause_s: 30.0,
             max_retries: 10,
             disk_reserve_mb: 500,
+            thermometer: None,
         }
     }
 }
@@ -101,6 +118,10 @@ fn default_seed() -> u64 {
 
 pub(super) fn default_timeout_s() -> f64 {
     10.0
+}
+
+fn default_every_s() -> f64 {
+    60.0
 }
 
 /// Checks that a bench could be as `rig.toml` says.
@@ -187,5 +208,56 @@ pub(super) fn check_bench(
             "give seconds from 0 to 86400",
         );
     }
+    let Some(thermometer) = &session.thermometer else {
+        return Ok(());
+    };
+    if thermometer.run.is_empty() {
+        return refuse(
+            "session.thermometer.run",
+            "names no program".into(),
+            "give a program that prints degrees Celsius, and its arguments",
+        );
+    }
+    let [least, most] = thermometer.limits_c;
+    if !(least.is_finite() && most.is_finite() && least < most) {
+        return refuse(
+            "session.thermometer.limits_c",
+            format!("{least} to {most} is not possible"),
+            "give the least and the most degrees Celsius",
+        );
+    }
+    if !(0.0..=86_400.0).contains(&thermometer.every_s) {
+        return refuse(
+            "session.thermometer.every_s",
+            format!("{} s is not possible", thermometer.every_s),
+            "give seconds from 0 to 86400",
+        );
+    }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thermometer_needs_a_program_and_limits_between_which_something_is() {
+        let read = |text: &str| toml::from_str::<SessionSettings>(text).unwrap();
+        let settings = read("[thermometer]\nrun = [\"cat\", \"t\"]\nlimits_c = [18, 26.5]\n");
+        assert_eq!(settings.thermometer.as_ref().unwrap().every_s, 60.0);
+        assert!(check_bench(None, None, Some(&settings), None).is_ok());
+        for (key, text) in [
+            ("run", "run = []\nlimits_c = [18, 26]"),
+            ("limits_c", "run = [\"t\"]\nlimits_c = [26, 18]"),
+            ("limits_c", "run = [\"t\"]\nlimits_c = [nan, 26]"),
+            (
+                "every_s",
+                "run = [\"t\"]\nlimits_c = [18, 26]\nevery_s = -1",
+            ),
+        ] {
+            let settings = read(&format!("[thermometer]\n{text}\n"));
+            let refused = check_bench(None, None, Some(&settings), None).unwrap_err();
+            assert_eq!(refused.key, format!("session.thermometer.{key}"));
+        }
+    }
 }

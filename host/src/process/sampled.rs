@@ -5,7 +5,7 @@ use super::account::{FrameReport, Outcome};
 use super::source::FrameRow;
 use crate::dataset::{Frame, Rig};
 use crate::vision::occlusion::find_occlusion;
-use crate::vision::{LeftOut, Mask, Registrar, SamplingGrid};
+use crate::vision::{LeftOut, Mask, Registrar, Registration, SamplingGrid};
 use gonia_brdf::{Direction, Pose};
 
 /// What one grid point shows.
@@ -60,6 +60,16 @@ impl FrameSampler {
 
     /// Registers a frame by its marks, and takes the value of every grid point.
     pub fn sample(&self, frame: &Frame, row: &FrameRow, hidden: Hidden) -> SampledFrame {
+        self.sample_registered(frame, row, hidden).0
+    }
+
+    /// As [`FrameSampler::sample`], with the registration: where in the frame the target is.
+    pub fn sample_registered(
+        &self,
+        frame: &Frame,
+        row: &FrameRow,
+        hidden: Hidden,
+    ) -> (SampledFrame, Registration) {
         let registration = self.registrar.register(frame, row.pose);
         let report = FrameReport {
             frame: row.frame,
@@ -76,7 +86,7 @@ impl FrameSampler {
             mask: None,
         };
         if let Outcome::Refused(_) = report.outcome {
-            return sampled;
+            return (sampled, registration);
         }
         let mask = match hidden {
             Hidden::Find => {
@@ -94,6 +104,6 @@ impl FrameSampler {
                 })
             })
             .collect();
-        sampled
+        (sampled, registration)
     }
 }

@@ -1,17 +1,19 @@
 //! `gonia capture`: a session on a bench, or on the simulated one.
 
 mod bench;
+mod map;
 mod terminal;
 
 use super::progress::Progress;
 use super::{process, table};
-use crate::capture::{Capture as Run, Ended, Orders};
+use crate::capture::{Capture as Run, Ended, Orders, Watch, Watchers, free_mb};
 use crate::dataset::frames_csv::write_frames_csv;
 use crate::dataset::plan_csv::read_plan_csv;
 use crate::dataset::rig::Reference;
 use crate::dataset::rig_toml::read_rig;
 use crate::dataset::samples::write_samples;
 use crate::dataset::{FileError, Rig, check_writable};
+use crate::live::{Listening, LivePage};
 use crate::plan::Rings;
 use crate::session::{
     Beginning, Claim, ControllerIdentity, End, Entry, Provenance, RIG, SessionFolder, SessionWriter,
@@ -19,13 +21,14 @@ use crate::session::{
 use anyhow::{Context, Result, bail};
 use bench::{Bench, Ports};
 use gonia_brdf::Pose;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use terminal::Terminal;
 
 /// Measures a material: every pose of the plan, its frame, its samples.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/session.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
+    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/session.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
 )]
 pub struct Capture {
     /// Folder of the session
@@ -51,6 +54,12 @@ pub struct Capture {
     /// Keep the frames too, as a capture folder
     #[arg(long)]
     keep_frames: bool,
+    /// Serve a live page at this address: 127.0.0.1:8080, or port 0 for any that is free
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    serve: Option<SocketAddr>,
+    /// Let other computers see the live page too: --serve may name any address
+    #[arg(long, requires = "serve")]
+    serve_anywhere: bool,
 }
 
 /// The session's folder before the controllers are asked.
@@ -68,6 +77,11 @@ impl Capture {
         let beside = beside(&self.rig, &rig)?;
         let beside = beside.as_ref().map(|(n, b)| (n.as_str(), b.as_slice()));
         let settings = rig.session.clone().unwrap_or_default();
+        // A port that is taken is found out before anything is begun.
+        let listening = match self.serve {
+            Some(address) => Some(Listening::at(address, self.serve_anywhere)?),
+            None => None,
+        };
         let begun = self.resume && SessionFolder::is_session(&self.folder);
         let (folder, plan) = if begun {
             let (writer, session) = SessionWriter::resume(&self.folder)?;
@@ -130,17 +144,32 @@ impl Capture {
         if self.keep_frames {
             check_writable(&self.folder.join("frames"))?;
         }
-        let terminal = Terminal::new(session.plan().len(), session.roles());
+        let terminal = Terminal::new(&session);
+        let live = match listening {
+            Some(listening) => Some(LivePage::serve(listening, &session, &orders)?),
+            None => None,
+        };
+        if let Some(live) = &live {
+            say_where(live);
+        }
+        let watchers: Vec<&dyn Watch> = match &live {
+            Some(live) => vec![&terminal, live],
+            None => vec![&terminal],
+        };
         let run = Run {
             rig: session.rig(),
             settings: &settings,
             keep_frames: self.keep_frames.then(|| self.folder.clone()),
             exact: bench.exact,
             orders: &orders,
-            watch: &terminal,
+            watch: &Watchers(watchers),
+            free_mb: &free_mb,
         };
         let ended = run.run(&mut bench.arms, bench.camera, writer, &session)?;
         terminal.finish();
+        if let Some(live) = &live {
+            live.end(ended.end, &ended.reason);
+        }
         self.conclude(&ended)
     }
 
@@ -181,6 +210,13 @@ impl Capture {
         table::print(&process::describe(&processed));
         Ok(())
     }
+}
+
+/// Where the live page is. What is behind the # no browser sends on.
+fn say_where(live: &LivePage) {
+    let (address, token) = (live.address(), live.token());
+    eprintln!("live page: http://{address}/#token={token}");
+    eprintln!("without the token the page only shows: http://{address}/");
 }
 
 /// The file that a rig speaks of, beside it.

@@ -1,63 +1,83 @@
-//! A session on the terminal: a bar on one, plain lines elsewhere.
+//! A session on the terminal: a map and a bar on one, plain lines elsewhere.
 
-use crate::capture::{Told, Watch};
+use super::map::{Mark, PoseMap};
+use crate::capture::{Pace, Told, Watch};
 use crate::cli::table;
-use crate::dataset::Role;
+use crate::dataset::rig::Target;
+use crate::dataset::{Role, write_whole_bytes};
+use crate::live::Thumbnail;
+use crate::process::Outcome;
+use crate::session::SessionFolder;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::sync::{Mutex, PoisonError};
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Plain lines come no more often than this.
+/// Plain lines, and pictures of the last frame, come no more often than this.
 const LINE_EVERY: Duration = Duration::from_secs(10);
+/// A terminal with fewer rows has no map.
+const ROWS_FOR_MAP: u16 = 20;
+/// The last frame with its marks as they were found.
+const LAST_FRAME: &str = "last_frame.png";
 
 /// Prints what a session tells.
 pub struct Terminal {
     bar: ProgressBar,
     plain: bool,
-    poses: u64,
-    roles: usize,
+    has_map: bool,
+    last_frame: PathBuf,
+    target: Target,
     state: Mutex<State>,
 }
 
 struct State {
     role: Role,
-    /// Poses of this role done in all, and by this run.
-    done: u64,
-    by_this_run: u64,
-    began: Instant,
-    printed: Instant,
+    pace: Pace,
+    map: PoseMap,
+    current: Option<usize>,
     worst_deg: f64,
+    events: u32,
+    printed: Instant,
+    /// When the last frame was drawn.
+    drawn: Option<Instant>,
+    has_picture: bool,
 }
 
 impl Terminal {
-    pub fn new(poses: usize, roles: &[Role]) -> Self {
+    pub fn new(session: &SessionFolder) -> Self {
+        let (plan, roles) = (session.plan(), session.roles());
         let plain = !std::io::stderr().is_terminal();
         let bar = if plain {
             ProgressBar::hidden()
         } else {
             let target = ProgressDrawTarget::stderr();
-            let bar = ProgressBar::with_draw_target(Some(poses as u64), target);
+            let bar = ProgressBar::with_draw_target(Some(plan.len() as u64), target);
             // The template is a constant; were it ever wrong, a plain bar would do.
             if let Ok(style) =
-                ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}")
+                ProgressStyle::with_template("{msg}\n{prefix} {wide_bar} {pos}/{len}")
             {
                 bar.set_style(style);
             }
             bar
         };
+        let rows = rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| size.ws_row);
         Self {
             bar,
             plain,
-            poses: poses as u64,
-            roles: roles.len(),
+            has_map: rows >= ROWS_FOR_MAP,
+            last_frame: session.folder().join(LAST_FRAME),
+            target: session.rig().target.clone(),
             state: Mutex::new(State {
                 role: Role::Material,
-                done: 0,
-                by_this_run: 0,
-                began: Instant::now(),
-                printed: Instant::now(),
+                pace: Pace::new(plan.len(), roles.len()),
+                map: PoseMap::new(plan),
+                current: None,
                 worst_deg: 0.0,
+                events: 0,
+                printed: Instant::now(),
+                drawn: None,
+                has_picture: false,
             }),
         }
     }
@@ -75,62 +95,130 @@ impl Terminal {
         }
     }
 
-    /// Rate, time left and pointing error.
-    fn figures(&self, state: &State) -> String {
-        let took_s = state.began.elapsed().as_secs_f64().max(1e-9);
-        let rate = state.by_this_run as f64 / took_s;
-        let later = match (state.role, self.roles) {
-            (Role::Reference, 2) => self.poses,
-            _ => 0,
-        };
-        let left = self.poses.saturating_sub(state.done) + later;
-        format!(
-            "{:.2} poses/s, {} left, pointing within {:.4} degrees",
-            rate,
-            table::duration(left as f64 / rate.max(1e-9)),
-            state.worst_deg
-        )
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    fn is_picture_due(&self) -> bool {
+        let mut state = self.state();
+        let is_due = state.drawn.is_none_or(|at| at.elapsed() >= LINE_EVERY);
+        if is_due {
+            state.drawn = Some(Instant::now());
+        }
+        is_due
+    }
+
+    fn keep_picture(&self, picture: &Thumbnail) {
+        // A disk that does not take it is found out by the frames.
+        let written = write_whole_bytes(&self.last_frame, &picture.png());
+        let mut state = self.state();
+        if written.is_ok() && !state.has_picture {
+            state.has_picture = true;
+            if self.plain {
+                eprintln!("last frame: {}", self.last_frame.display());
+            }
+        }
+    }
+
+    fn event(&self, state: &mut State, text: &str) {
+        state.events += 1;
+        self.line(text);
+    }
+
+    fn draw(&self, state: &State) {
+        let mut lines = Vec::new();
+        if self.has_map {
+            lines = state.map.lines(state.current);
+        }
+        lines.push(figures(state));
+        if state.has_picture {
+            lines.push(format!("last frame: {}", self.last_frame.display()));
+        }
+        self.bar.set_message(lines.join("\n"));
+    }
+}
+
+/// Rate, time left, pointing error and faults.
+fn figures(state: &State) -> String {
+    let rate = state.pace.rate().unwrap_or(0.0);
+    let left = state.pace.left_s().map_or("?".into(), table::duration);
+    let events = match state.events {
+        0 => String::new(),
+        1 => ", 1 event".into(),
+        n => format!(", {n} events"),
+    };
+    format!(
+        "{rate:.2} poses/s, {left} left, pointing within {:.4} degrees{events}",
+        state.worst_deg
+    )
 }
 
 impl Watch for Terminal {
     fn tell(&self, news: &Told) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Told::Frame {
+            frame,
+            registration,
+            sampled,
+        } = news
+            && self.is_picture_due()
+        {
+            // Not while others wait for the state: the arms are among them.
+            let outcome = sampled.report.outcome;
+            self.keep_picture(&Thumbnail::of(frame, registration, outcome, &self.target));
+        }
+        let mut state = self.state();
         match news {
             Told::Begin {
                 role,
-                done,
+                missing,
                 planned,
             } => {
                 state.role = *role;
-                state.done = *done as u64;
-                state.by_this_run = 0;
-                state.began = Instant::now();
+                state.pace.begin(*role, missing.len(), Instant::now());
+                state.map.begin(missing);
                 self.bar.set_prefix(role.name());
-                self.bar.set_position(*done as u64);
                 self.line(&format!(
-                    "{}: {done} of {planned} poses are done",
-                    role.name()
+                    "{}: {} of {planned} poses are done",
+                    role.name(),
+                    state.pace.done
                 ));
             }
-            Told::Pose { done, .. } => {
-                state.done += 1;
-                state.by_this_run += 1;
+            Told::Going { index } => state.current = Some(*index),
+            Told::Frame { .. } => return,
+            Told::Pose { done, frame } => {
+                let mark = match frame.report.outcome {
+                    Outcome::Refused(_) => Mark::Bad,
+                    _ => Mark::Done,
+                };
+                state.map.set(done.index, mark);
+                state.pace.pose(Instant::now());
                 state.worst_deg = state.worst_deg.max(done.pointing_deg);
-                self.bar.set_position(state.done);
-                self.bar.set_message(self.figures(&state));
                 if self.plain && state.printed.elapsed() >= LINE_EVERY {
                     state.printed = Instant::now();
                     eprintln!(
                         "{}: {} of {} poses, {}",
                         state.role.name(),
-                        state.done,
-                        self.poses,
-                        self.figures(&state)
+                        state.pace.done,
+                        state.pace.planned,
+                        figures(&state)
                     );
                 }
             }
-            Told::Event(text) => self.line(text),
+            Told::Void(poses) => {
+                for index in *poses {
+                    state.map.set(*index, Mark::ToDo);
+                }
+                state.pace.void(poses.len());
+            }
+            Told::GivenUp { index, why } => {
+                state.map.set(*index, Mark::Bad);
+                self.event(&mut state, why);
+            }
+            Told::Held(true) => {}
+            Told::Held(false) => state.pace.go_on(Instant::now()),
+            Told::Event(text) => self.event(&mut state, text),
         }
+        self.bar.set_position(state.pace.done as u64);
+        self.draw(&state);
     }
 }
