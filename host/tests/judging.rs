@@ -253,13 +253,15 @@ fn rivals_are_made_judged_and_shown_in_the_report() {
     let path = |name: &str| dir.path().join(name);
     let model = Kurt::white_reference_fabric();
     write_samples(&path("samples.npy"), &session(&model)).unwrap();
-    write(&path("dense.exr"), 7.5, &model, Scale::Relative);
-    write(&path("truth.exr"), 7.5, &model, Scale::Absolute);
-    let said = refused(&["rivals", text(dir.path()), "--step", "10"]);
-    assert!(
-        said.contains("a multiple of dense.exr's 7.5 degrees"),
-        "{said}"
-    );
+    write(&path("dense.exr"), 5.0, &model, Scale::Relative);
+    write(&path("truth.exr"), 5.0, &model, Scale::Absolute);
+    for (step, word) in [
+        ("12", "a multiple of dense.exr's 5 degrees"),
+        ("30", "at most 20"),
+    ] {
+        let said = refused(&["rivals", text(dir.path()), "--step", step]);
+        assert!(said.contains(word), "{said}");
+    }
     let made = |more: &[&str]| {
         let arguments = [
             "rivals",
@@ -273,10 +275,10 @@ fn rivals_are_made_judged_and_shown_in_the_report() {
         Rivals::read(&path("rivals.toml")).unwrap()
     };
     // The paper's method takes a second for a thousand cells.
-    let found = made(&["--step", "30"]);
+    let found = made(&["--step", "20"]);
     for row in &found.rows[1..] {
         let table = read_dense(&path(&format!("{}.exr", row.name))).unwrap();
-        assert_eq!(table.brdf.grid().step_deg(), 30.0, "{}", row.name);
+        assert_eq!(table.brdf.grid().step_deg(), 20.0, "{}", row.name);
     }
     assert!(found.rows.iter().any(|row| row.name == "sparse-paper"));
     let found = made(&["--step", "15", "--without-paper"]);

@@ -27,7 +27,7 @@ use std::time::Instant;
 /// around a cylinder, Kurt's model of two lobes and the microcylinder model.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr (those\nof the paper's method on a grid of 10 to 30 degrees).\n\n--step 4 makes and judges them on a grid of 4 degrees, for a tenth of the time and of the disk; the paper's\nmethod has the bins of the session's own grid in any case."
+    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr (those of the\npaper's method on a grid of 10 to 20 degrees).\n\n--step 4 makes and judges them on a grid of 4 degrees, which is a sixteenth of the disk. gonia's own\ninterpolation then has bins of 4 degrees; the paper's method has those of the session's grid."
 )]
 pub struct Rivals {
     /// The folder of a measurement
@@ -46,6 +46,9 @@ pub struct Rivals {
     starts: usize,
 }
 
+/// A coarser grid leaves nothing to interpolate.
+const STEP_MAX_DEG: f64 = 20.0;
+
 /// The session, and what the rivals are judged by.
 struct Session {
     dense: DenseFile,
@@ -63,6 +66,9 @@ impl Rivals {
             return Ok(own);
         };
         let grid = Grid::with_step_deg(step).context("--step")?;
+        if step > STEP_MAX_DEG {
+            bail!("--step {step}: at most {STEP_MAX_DEG} degrees");
+        }
         if (step / own.step_deg()).fract() != 0.0 {
             bail!(
                 "--step {step}: must be a multiple of {DENSE}'s {} degrees",

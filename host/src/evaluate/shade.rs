@@ -33,7 +33,7 @@ pub fn shade(
     viewer: Vec3,
 ) -> Vec<[f32; 3]> {
     let grid = table.grid();
-    let lights = Lights::new(lights);
+    let turned = Lights::new(lights);
     // The first of the four nodes around the view stands for all of them.
     let mut seen: Vec<(u32, u32)> = points
         .par_iter()
@@ -53,6 +53,15 @@ pub fn shade(
             |gathered, groups| {
                 let mut found = Vec::new();
                 for group in groups {
+                    // Four nodes a light and point: if those are few, all nodes are too many.
+                    if 4 * group.len() * lights.len() < grid.n_directions() {
+                        found.extend(group.iter().map(|(_, point)| {
+                            let frame = &points[*point as usize];
+                            let rgb = look_up(table, rows, frame, lights, viewer);
+                            (*point, rgb.map(|v| factor * v))
+                        }));
+                        continue;
+                    }
                     for (k, (_, point)) in group.iter().enumerate() {
                         let frame = &points[*point as usize];
                         let view = Direction::from_vec3(frame.to_local(viewer));
@@ -61,7 +70,7 @@ pub fn shade(
                             gathered.fill(table, rows, corners.map(|corner| corner.0));
                         }
                         let weights = corners.map(|corner| factor * corner.1 as f32);
-                        found.push((*point, gathered.radiance(frame, &lights, weights)));
+                        found.push((*point, gathered.radiance(frame, &turned, weights)));
                     }
                 }
                 found
@@ -74,6 +83,33 @@ pub fn shade(
         radiance[point as usize] = rgb;
     }
     radiance
+}
+
+/// The radiance of one point, light by light.
+fn look_up(
+    table: &DenseBrdf,
+    rows: Rows,
+    frame: &Frame,
+    lights: &[Light],
+    viewer: Vec3,
+) -> [f32; 3] {
+    let view = Direction::from_vec3(frame.to_local(viewer));
+    let mut sum = [0.0; 3];
+    for light in lights {
+        let towards = frame.to_local(light.towards);
+        if towards[2] <= LEAST_COSINE {
+            continue;
+        }
+        let at = Direction::from_vec3(towards);
+        let f = match rows {
+            Rows::View => table.lookup(view, at),
+            Rows::Light => table.lookup(at, view),
+        };
+        for c in 0..3 {
+            sum[c] += f64::from(f[c]) * light.irradiance[c] * towards[2];
+        }
+    }
+    sum.map(|v| v as f32)
 }
 
 /// Lights, an array each quantity, so that several are turned at once.
@@ -242,7 +278,7 @@ fn arc(y: f32, x: f32) -> f32 {
         0.042_909_614,
         -0.075_289_64,
         0.106_562_64,
-        -0.142_088_99,
+        -0.142_089,
         0.199_935_51,
         -0.333_331_45,
         1.0,

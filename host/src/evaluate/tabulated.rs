@@ -102,9 +102,12 @@ mod tests {
         let skewed = rough(grid);
         let even = DenseBrdf::from_fn(grid, |i, v| skewed.at(i.min(v), i.max(v)));
         let at = |t: f64, p: f64| Direction::from_deg(t, p).to_vec3();
-        let points: Vec<Frame> = (0..300)
+        // Six points near each other, at a hundred places.
+        let points: Vec<Frame> = (0..600)
             .map(|k| {
-                let (t, p) = (f64::from(k % 60) * 1.7, f64::from(k) * 77.7);
+                let (place, beside) = (k / 6, f64::from(k % 6));
+                let t = f64::from(place % 60) * 1.7 + 0.1 * beside;
+                let p = f64::from(place) * 77.7 + 0.2 * beside;
                 // A frame turned by p about its normal, which leans by t towards x.
                 let (lean, across) = (t.to_radians().sin_cos(), p.to_radians().sin_cos());
                 let down = [lean.1, 0.0, -lean.0];
@@ -123,10 +126,17 @@ mod tests {
             })
             .collect();
         let viewer = [0.0, 0.0, 1.0];
-        for dense in [&skewed, &even] {
+        // Many lights, for which rows are gathered, and few.
+        let many = lights.repeat(20);
+        for (dense, lights) in [
+            (&skewed, &many),
+            (&even, &many),
+            (&skewed, &lights),
+            (&even, &lights),
+        ] {
             let table = Tabulated::scaled(dense, 1.5);
-            let together = table.shade(&points, &lights, viewer);
-            let each = shade_one_by_one(&table, &points, &lights, viewer);
+            let together = table.shade(&points, lights, viewer);
+            let each = shade_one_by_one(&table, &points, lights, viewer);
             for (k, (a, b)) in together.iter().zip(&each).enumerate() {
                 for c in 0..3 {
                     assert!((a[c] - b[c]).abs() <= 1e-4 * b[c], "{k}: {a:?} {b:?}");
