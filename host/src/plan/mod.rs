@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn any_poses_are_ordered_without_loss_and_for_a_shorter_way() {
         let mut poses = Rings::quick().listed();
-        poses.retain(|p| ((p.light.phi + 2.0 * p.view.phi) * 1e4) as u64 % 3 == 0);
+        poses.retain(|p| (((p.light.phi + 2.0 * p.view.phi) * 1e4) as u64).is_multiple_of(3));
         let ordered = order(&poses, &time, &time);
         assert!(poses.len() > 100 && ordered.poses.len() == poses.len());
         assert!(poses.iter().all(|pose| ordered.poses.contains(pose)));
