@@ -249,7 +249,7 @@ fn interpolated(bins: &Bins) -> DenseBrdf {
         noise_variance: (NOISE * NOISE) as f32,
         ..interpolate::Settings::DEFAULT
     };
-    interpolate::fill(bins, &base, &|_| ()).unwrap()
+    interpolate::fill(&interpolate::Known::new(bins), &base, &|_| ()).unwrap()
 }
 
 /// Deviations of the fits of several sessions in units of their uncertainties, number by number.
