@@ -84,7 +84,7 @@ impl Preset {
         let (block_deg, tolerance, budget, nodes) = match self {
             Preset::Preview => (8.0, f32::INFINITY, 0.0, 32),
             Preset::Fast => (8.0, 2.0, 2.0, 64),
-            Preset::Default => (8.0, 1.0, 4.0, 128),
+            Preset::Default => (8.0, 1.0, 6.0, 128),
             Preset::Best => (8.0, 0.5, f32::INFINITY, 256),
         };
         Settings {

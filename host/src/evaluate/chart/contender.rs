@@ -69,12 +69,12 @@ pub(super) struct Run {
 
 /// Block settings beside the presets, by name: no refinement, all of it, more and less.
 const BLOCKS: [&str; 6] = [
-    "blocks=16,nodes=64,tolerance=inf",
-    "blocks=8,nodes=64,tolerance=inf",
-    "blocks=8,nodes=128,tolerance=inf",
-    "blocks=8,nodes=64,tolerance=1",
-    "blocks=8,nodes=128,tolerance=4",
-    "blocks=8,nodes=128,tolerance=0",
+    "blocks=16,nodes=64,tolerance=inf,budget=inf",
+    "blocks=8,nodes=64,tolerance=inf,budget=inf",
+    "blocks=8,nodes=128,tolerance=inf,budget=inf",
+    "blocks=8,nodes=64,tolerance=1,budget=inf",
+    "blocks=8,nodes=128,tolerance=4,budget=inf",
+    "blocks=8,nodes=128,tolerance=0,budget=inf",
 ];
 
 /// Methods that work cell by cell, by name.
@@ -226,9 +226,13 @@ impl fmt::Display for Contender {
                     block_deg,
                     nodes,
                     tolerance,
+                    budget,
                     ..
                 } = settings;
-                write!(f, "blocks={block_deg},nodes={nodes},tolerance={tolerance}")
+                write!(
+                    f,
+                    "blocks={block_deg},nodes={nodes},tolerance={tolerance},budget={budget}"
+                )
             }
         }
     }
@@ -237,18 +241,21 @@ impl fmt::Display for Contender {
 impl FromStr for Contender {
     type Err = SettingsError;
 
-    /// `blocks=DEGREES,nodes=N,tolerance=T`, or the name of a method that works cell by cell.
+    /// `blocks=DEGREES,nodes=N,tolerance=T,budget=B`, or the name of a method that works cell by cell.
     fn from_str(text: &str) -> Result<Self, SettingsError> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
-            let (nodes, tolerance) = rest.split_once(",tolerance=")?;
+            let (nodes, rest) = rest.split_once(",tolerance=")?;
+            let (tolerance, budget) = rest.split_once(",budget=")?;
             let block_deg = block.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
             let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
+            let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
             Some(Contender::Blocks(Settings {
                 block_deg,
                 nodes,
                 tolerance,
+                budget,
                 ..Settings::DEFAULT
             }))
         };
