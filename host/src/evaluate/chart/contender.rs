@@ -69,12 +69,12 @@ pub(super) struct Run {
 
 /// Block settings beside the presets, by name: no refinement, all of it, more and less.
 const BLOCKS: [&str; 6] = [
-    "blocks=16,nodes=64,tolerance=inf,budget=inf",
-    "blocks=8,nodes=64,tolerance=inf,budget=inf",
-    "blocks=8,nodes=128,tolerance=inf,budget=inf",
-    "blocks=8,nodes=64,tolerance=1,budget=inf",
-    "blocks=8,nodes=128,tolerance=4,budget=inf",
-    "blocks=8,nodes=128,tolerance=0,budget=inf",
+    "blocks=16,nodes=64,tolerance=inf",
+    "blocks=8,nodes=64,tolerance=inf",
+    "blocks=8,nodes=128,tolerance=inf",
+    "blocks=8,nodes=64,tolerance=1",
+    "blocks=8,nodes=128,tolerance=4",
+    "blocks=8,nodes=128,tolerance=0",
 ];
 
 /// Methods that work cell by cell, by name.
@@ -229,10 +229,11 @@ impl fmt::Display for Contender {
                     budget,
                     ..
                 } = settings;
-                write!(
-                    f,
-                    "blocks={block_deg},nodes={nodes},tolerance={tolerance},budget={budget}"
-                )
+                write!(f, "blocks={block_deg},nodes={nodes},tolerance={tolerance}")?;
+                if budget.is_finite() {
+                    write!(f, ",budget={budget}")?;
+                }
+                Ok(())
             }
         }
     }
@@ -241,12 +242,12 @@ impl fmt::Display for Contender {
 impl FromStr for Contender {
     type Err = SettingsError;
 
-    /// `blocks=DEGREES,nodes=N,tolerance=T,budget=B`, or the name of a method that works cell by cell.
+    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B`, or the name of a method that works cell by cell.
     fn from_str(text: &str) -> Result<Self, SettingsError> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
             let (nodes, rest) = rest.split_once(",tolerance=")?;
-            let (tolerance, budget) = rest.split_once(",budget=")?;
+            let (tolerance, budget) = rest.split_once(",budget=").unwrap_or((rest, "inf"));
             let block_deg = block.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
             let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
