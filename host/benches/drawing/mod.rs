@@ -144,7 +144,7 @@ fn curves(svg: &mut String, line: &Line) {
             at,
             HEIGHT - 26.0,
             if share == 1.0 { "end" } else { "middle" },
-            &format!("{:.1} {}", value(x), line.x),
+            &format!("{:.*} {}", usize::from(value(x) < 100.0), value(x), line.x),
         );
         let at = HEIGHT - 40.0 - (HEIGHT - 70.0) * share;
         text(svg, 37.0, at + 3.0, "end", &format!("{:.3}", value(y)));
