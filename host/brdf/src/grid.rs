@@ -101,7 +101,11 @@ impl Grid {
         if i_theta == 0 {
             return Some(0);
         }
-        let i_phi = rounded(wrap_deg(phi_deg) / step) % self.n_phi;
+        let mut i_phi = rounded(wrap_deg(phi_deg) / step);
+        // At most a whole turn; a remainder would be a division of integers.
+        if i_phi == self.n_phi {
+            i_phi = 0;
+        }
         Some(i_theta * self.n_phi + i_phi)
     }
 

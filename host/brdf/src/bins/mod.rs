@@ -49,13 +49,16 @@ impl Bins {
             .collect();
         let nodes = Nodes::new(grid);
         let lights: Vec<usize> = (0..grid.n_directions()).collect();
-        let bins = lights
+        let parts: Vec<Vec<Bin>> = lights
             .par_chunks(LIGHTS_AT_A_TIME)
             .map(|lights| {
                 let mut scratch = Vec::new();
                 let mut keys: Vec<u64> = Vec::new();
                 let mut sorted: Vec<Sample> = Vec::new();
-                let mut bins = Vec::new();
+                // Room for one bin a sample: memory that is not touched costs nothing.
+                let samples_here =
+                    |light: &usize| shares.iter().map(|s| s.of(*light).len()).sum::<usize>();
+                let mut bins = Vec::with_capacity(lights.iter().map(samples_here).sum());
                 for &light in lights {
                     keys.clear();
                     for share in &shares {
@@ -77,11 +80,10 @@ impl Bins {
                 }
                 bins
             })
-            .collect::<Vec<_>>()
-            .concat();
+            .collect();
         Self {
             grid,
-            bins,
+            bins: joined(&parts),
             outside: shares.iter().map(|share| share.outside).sum(),
         }
     }
@@ -116,8 +118,31 @@ fn number_of(key: u64) -> usize {
     (key & 0xffff_ffff) as usize
 }
 
+/// All parts in one, by all threads: the new memory costs more than the copying.
+fn joined(parts: &[Vec<Bin>]) -> Vec<Bin> {
+    let mut count = 0;
+    let starts: Vec<usize> = parts
+        .iter()
+        .map(|part| {
+            count += part.len();
+            count - part.len()
+        })
+        .collect();
+    (0..count)
+        .into_par_iter()
+        .map(|k| {
+            // Of empty parts, which start where the next one does, the last of them all is not empty.
+            let part = starts.partition_point(|start| *start <= k) - 1;
+            parts[part][k - starts[part]]
+        })
+        .collect()
+}
+
 /// Light directions that one task sorts and summarizes.
 const LIGHTS_AT_A_TIME: usize = 32;
+
+/// In place of a node, of a sample that is outside.
+const OUTSIDE: u32 = u32::MAX;
 
 /// Some of the samples, put in order of their light's node.
 struct ByLight {
@@ -131,21 +156,27 @@ struct ByLight {
 impl ByLight {
     /// `first` is the number of the first sample.
     fn new(grid: Grid, samples: &[Sample], first: usize) -> Self {
-        let cells: Vec<Option<(u32, u32)>> = samples.iter().map(|s| nodes_of(grid, s)).collect();
         let mut starts = vec![0u32; grid.n_directions() + 1];
-        for (light, _) in cells.iter().flatten() {
-            starts[*light as usize + 1] += 1;
-        }
+        let nodes: Vec<(u32, u32)> = samples
+            .iter()
+            .map(|s| {
+                let (light, view) = nodes_of(grid, s).unwrap_or((OUTSIDE, OUTSIDE));
+                if light != OUTSIDE {
+                    starts[light as usize + 1] += 1;
+                }
+                (light, view)
+            })
+            .collect();
         for light in 0..grid.n_directions() {
             starts[light + 1] += starts[light];
         }
         let inside = starts[grid.n_directions()] as usize;
         let mut keys = vec![0u64; inside];
         let mut next = starts.clone();
-        for (number, cell) in cells.iter().enumerate() {
-            if let Some((light, view)) = cell {
-                let at = &mut next[*light as usize];
-                keys[*at as usize] = key_of(*view, first + number);
+        for (number, &(light, view)) in nodes.iter().enumerate() {
+            if light != OUTSIDE {
+                let at = &mut next[light as usize];
+                keys[*at as usize] = key_of(view, first + number);
                 *at += 1;
             }
         }
@@ -181,16 +212,26 @@ fn summarize(
     if group.iter().any(|s| s.frame != frame) {
         frame = Sample::NO_FRAME;
     }
-    let mut value = [0.0; 3];
-    let mut mad = [0.0; 3];
-    for c in 0..3 {
-        scratch.clear();
-        scratch.extend(group.iter().map(|s| s.rgb[c]));
-        value[c] = median(scratch);
-        let centre = value[c];
-        scratch.iter_mut().for_each(|v| *v = (*v - centre).abs());
-        mad[c] = median(scratch);
-    }
+    let (value, mad) = match group {
+        // Many bins are one of these two.
+        [one] => (one.rgb, [0.0; 3]),
+        [a, b] => (
+            [0, 1, 2].map(|c| 0.5 * (a.rgb[c] + b.rgb[c])),
+            [0, 1, 2].map(|c| 0.5 * (a.rgb[c] - b.rgb[c]).abs()),
+        ),
+        _ => {
+            let (mut value, mut mad) = ([0.0; 3], [0.0; 3]);
+            for c in 0..3 {
+                scratch.clear();
+                scratch.extend(group.iter().map(|s| s.rgb[c]));
+                value[c] = median(scratch);
+                let centre = value[c];
+                scratch.iter_mut().for_each(|v| *v = (*v - centre).abs());
+                mad[c] = median(scratch);
+            }
+            (value, mad)
+        }
+    };
     Bin {
         cell: cell as u32,
         count: group.len() as u32,
