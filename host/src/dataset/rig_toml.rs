@@ -8,7 +8,7 @@ use super::{FileError, toml_text};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-const REMEDY: &str = "see the rig.toml of the README for the keys and their units";
+const REMEDY: &str = "docs/frames.md has the keys and their units";
 
 /// Reads a rig and checks that it could exist.
 ///
@@ -278,6 +278,16 @@ mod tests {
         });
         write_rig(&path, &rig).unwrap();
         assert_eq!(read_rig(&path).unwrap(), rig);
+    }
+
+    #[test]
+    fn the_documented_rig_is_the_papers() {
+        let page = include_str!("../../../docs/frames.md");
+        let (_, rest) = page.split_once("```toml\n").unwrap();
+        let (text, _) = rest.split_once("```").unwrap();
+        let mut paper = Rig::paper(1024);
+        paper.reference = Some(Reference::Reflectance([0.99; 3]));
+        assert_eq!(read_text(text).unwrap(), paper);
     }
 
     #[test]
