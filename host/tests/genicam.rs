@@ -7,6 +7,7 @@ mod common;
 mod session;
 
 use common::{gonia_ok, text};
+use gonia::camera::genicam::CONTROL_PORT;
 use gonia::camera::simulated_gige::{GigeError, GigeTrouble, GigeTroubles};
 use gonia::camera::{Camera, CameraError, GenicamCamera, RenderingCamera, SimulatedGige};
 use gonia::capture::{Arms, Capture, Ended, Orders, Told, Watch, free_mb};
@@ -22,7 +23,7 @@ use gonia_sim::bench::Bench;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::rig::SimRig;
 use session::{begin, small_rig};
-use std::net::Ipv4Addr;
+use std::net::{Ipv4Addr, UdpSocket};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -292,7 +293,10 @@ fn a_camera_that_is_not_there_or_not_as_the_rig_says_is_refused_in_one_line_unti
     );
     // One camera has one master.
     let text = refused(&rig, &setup(), &[0.01]);
-    assert!(text.contains("127.0.0.1"), "{text}");
+    assert!(
+        text.contains("the camera at 127.0.0.1: is used by another program; end that one"),
+        "{text}"
+    );
     drop(device);
     let gone = camera.reopen().unwrap_err().to_string();
     assert!(gone.contains("cannot be opened"), "{gone}");
@@ -300,4 +304,29 @@ fn a_camera_that_is_not_there_or_not_as_the_rig_says_is_refused_in_one_line_unti
     let _device = gige(&rig, &arms(), |_| None);
     assert_eq!(camera.reopen(), Ok(()));
     assert_eq!(camera.ready(0), Ok(0));
+}
+
+#[test]
+fn a_camera_that_a_killed_program_held_is_waited_for() {
+    let _alone = alone();
+    let rig = rig();
+    let _device = gige(&rig, &arms(), |_| None);
+    // What takes control (GigE Vision's register 0xA00), and is never heard of again.
+    let killed = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let timeout = Some(Duration::from_secs(5));
+    killed.set_read_timeout(timeout).unwrap();
+    let mut answer = [0; 64];
+    killed
+        .send_to(
+            &[0x42, 1, 0, 0x82, 0, 8, 0, 1, 0, 0, 0x0a, 0, 0, 0, 0, 2],
+            (Ipv4Addr::LOCALHOST, CONTROL_PORT),
+        )
+        .unwrap();
+    // Acknowledged, without an error.
+    assert_eq!(killed.recv(&mut answer).unwrap(), 12);
+    assert_eq!(answer[..4], [0, 0, 0, 0x83]);
+    let start = Instant::now();
+    let camera = GenicamCamera::open(&rig, &setup(), &[0.01]).unwrap();
+    assert!(camera.identity().contains("serial sim-1"));
+    assert!(start.elapsed() > Duration::from_secs(1), "it was not held");
 }

@@ -22,6 +22,10 @@ const SPARE_BUFFERS: usize = 8;
 /// A camera that was opened anew may still send what it had; it is done when nothing came for so long.
 const QUIET: Duration = Duration::from_millis(300);
 
+/// How long another program's control is waited for: one that was killed has it for its heartbeat, 3 s
+/// by default.
+const HEARTBEAT: Duration = Duration::from_secs(5);
+
 /// A camera opened by its address.
 pub struct GenicamCamera {
     setup: Genicam,
@@ -53,7 +57,8 @@ impl GenicamCamera {
     /// Opens a camera and sets it up: all that `source` says, the trigger, and the acquisition.
     ///
     /// # Errors
-    /// No camera answers at the address, somebody else controls it, or it refuses a setting.
+    /// No camera answers at the address, somebody else controls it (a program that was killed does so for a
+    /// few seconds, which are waited for), or it refuses a setting.
     pub fn open(rig: &Rig, setup: &Genicam, exposures_s: &[f64]) -> Result<Self, CameraError> {
         let (Some(format), Some(sensor)) =
             (PixelFormat::named(&setup.pixel_format), rig.sensor.clone())
@@ -88,7 +93,7 @@ impl GenicamCamera {
         let absent = |why: &dyn Display| {
             self.failed(
                 format_args!("cannot be opened ({why})"),
-                "check its power, cable and address, and that no other program uses it",
+                "check its power, cable and address",
             )
         };
         let Some(ip) = self.setup.ip() else {
@@ -96,8 +101,18 @@ impl GenicamCamera {
         };
         let own = own_address(ip).map_err(|error| absent(&error))?;
         let [own, ip] = [own, ip].map(|ip| gio::InetAddress::from(std::net::IpAddr::V4(ip)));
-        // Opening by name would search the network for it.
-        let device = GvDevice::new(&own, &ip).map_err(|error| absent(&error))?;
+        let until = Instant::now() + HEARTBEAT;
+        let device = loop {
+            // Opening by name would search the network for it.
+            let device = GvDevice::new(&own, &ip).map_err(|error| absent(&error))?;
+            if device.is_controller() {
+                break device;
+            }
+            if Instant::now() > until {
+                return Err(self.failed("is used by another program", "end that one"));
+            }
+            std::thread::sleep(QUIET);
+        };
         let camera = aravis::Camera::with_device(&device).map_err(|error| absent(&error))?;
         self.set_up(&camera, &device).map_err(|error| {
             self.failed(
