@@ -62,17 +62,15 @@ pub fn shade(
                         }));
                         continue;
                     }
-                    gathered.fill(table, rows, group[0].0 as usize);
-                    let frames = group.iter().map(|(_, point)| points[*point as usize]);
-                    let lit = gathered.light(frames.clone(), &turned);
-                    for (((_, point), frame), sum) in group.iter().zip(frames).zip(lit) {
+                    for (k, (_, point)) in group.iter().enumerate() {
+                        let frame = &points[*point as usize];
                         let view = Direction::from_vec3(frame.to_local(viewer));
-                        let weights = grid.corners(view).map(|corner| factor * corner.1 as f32);
-                        let rgb = [0, 1, 2].map(|c| {
-                            let rows = weights.iter().zip(sum.0.chunks_exact(4));
-                            rows.map(|(weight, row)| weight * row[c]).sum()
-                        });
-                        found.push((*point, rgb));
+                        let corners = grid.corners(view);
+                        if k == 0 {
+                            gathered.fill(table, rows, corners.map(|corner| corner.0));
+                        }
+                        let weights = corners.map(|corner| factor * corner.1 as f32);
+                        found.push((*point, gathered.radiance(frame, &turned, weights)));
                     }
                 }
                 found
@@ -114,34 +112,23 @@ fn look_up(
     sum.map(|v| v as f32)
 }
 
-/// Lights that are turned at once.
-const LANES: usize = 16;
-
-/// Lights by [`LANES`], an array each quantity; the last ones are filled up with darkness.
-struct Lights(Vec<LightBlock>);
-
-struct LightBlock {
-    towards: [[f32; LANES]; 3],
-    /// Red, green, blue and nothing.
-    irradiance: [[f32; 4]; LANES],
+/// Lights, an array each quantity, so that several are turned at once.
+struct Lights {
+    towards: [Vec<f32>; 3],
+    irradiance: Vec<[f32; 4]>,
 }
 
 impl Lights {
     fn new(lights: &[Light]) -> Self {
-        let block = |lights: &[Light]| {
-            let mut block = LightBlock {
-                towards: [[0.0; LANES]; 3],
-                irradiance: [[0.0; 4]; LANES],
-            };
-            for (lane, light) in lights.iter().enumerate() {
-                for k in 0..3 {
-                    block.towards[k][lane] = light.towards[k] as f32;
-                    block.irradiance[lane][k] = light.irradiance[k] as f32;
-                }
-            }
-            block
+        let axis = |k: usize| lights.iter().map(|light| light.towards[k] as f32).collect();
+        let rgb0 = |light: &Light| {
+            let [r, g, b] = light.irradiance.map(|e| e as f32);
+            [r, g, b, 0.0]
         };
-        Self(lights.chunks(LANES).map(block).collect())
+        Self {
+            towards: [axis(0), axis(1), axis(2)],
+            irradiance: lights.iter().map(rgb0).collect(),
+        }
     }
 }
 
@@ -150,15 +137,11 @@ impl Lights {
 #[repr(align(64))]
 struct Values([f32; 16]);
 
-const NOTHING: Values = Values([0.0; 16]);
-
-/// Four rows of the table. A ring of nodes begins again at its end, and the last one is there twice,
-/// so that the four nodes around a light are always a node, the next one, and the same a ring on.
+/// Four rows of the table, and the lights as a point sees them.
 struct Gathered {
     grid: Grid,
     nodes: Vec<Values>,
-    sums: Vec<Values>,
-    frames: Vec<[[f32; 3]; 3]>,
+    local: [Vec<f32>; 3],
     arch: Arch,
 }
 
@@ -166,156 +149,118 @@ impl Gathered {
     fn new(grid: Grid) -> Self {
         Self {
             grid,
-            nodes: vec![NOTHING; (grid.n_theta() + 1) * (grid.n_phi() + 1)],
-            sums: Vec::new(),
-            frames: Vec::new(),
+            nodes: vec![Values([0.0; 16]); grid.n_directions()],
+            local: Default::default(),
             arch: Arch::new(),
         }
     }
 
-    /// Brings the four rows around a view together, whose first is given: each cache line is written
-    /// once.
-    fn fill(&mut self, table: &DenseBrdf, rows: Rows, first: usize) {
-        let (n, n_phi) = (self.grid.n_directions(), self.grid.n_phi());
-        let (ring, phi) = (first / n_phi, first % n_phi);
-        let next_ring = (ring + 1).min(self.grid.n_theta() - 1);
-        let next_phi = (phi + 1) % n_phi;
-        let corners = [
-            first,
-            ring * n_phi + next_phi,
-            next_ring * n_phi + phi,
-            next_ring * n_phi + next_phi,
-        ];
+    /// Brings four rows together, node by node: each cache line is written once.
+    fn fill(&mut self, table: &DenseBrdf, rows: Rows, corners: [usize; 4]) {
+        let n = self.grid.n_directions();
         let planes = table.planes().each_ref().map(Vec::as_slice);
-        let rings = self.nodes.chunks_exact_mut(n_phi + 1);
-        for (nodes, first) in rings.zip((0..n).step_by(n_phi)) {
-            match rows {
-                Rows::View => {
-                    let rows =
-                        corners.map(|row| planes.map(|plane| &plane[row * n + first..][..n_phi]));
-                    for (node, values) in nodes[..n_phi].iter_mut().enumerate() {
-                        for (lanes, row) in values.0.chunks_exact_mut(4).zip(&rows) {
-                            for c in 0..3 {
-                                lanes[c] = row[c][node];
-                            }
-                        }
-                    }
-                }
-                Rows::Light => {
-                    let rows = ((first * n)..).step_by(n);
-                    for (values, row) in nodes[..n_phi].iter_mut().zip(rows) {
-                        for (lanes, column) in values.0.chunks_exact_mut(4).zip(corners) {
-                            for c in 0..3 {
-                                lanes[c] = planes[c][row + column];
-                            }
+        match rows {
+            Rows::View => {
+                let rows = corners.map(|row| planes.map(|plane| &plane[row * n..(row + 1) * n]));
+                for (node, values) in self.nodes.iter_mut().enumerate() {
+                    for (lanes, row) in values.0.chunks_exact_mut(4).zip(&rows) {
+                        for c in 0..3 {
+                            lanes[c] = row[c][node];
                         }
                     }
                 }
             }
-            nodes[n_phi] = nodes[0];
+            Rows::Light => {
+                for (values, first) in self.nodes.iter_mut().zip((0..).step_by(n)) {
+                    for (lanes, column) in values.0.chunks_exact_mut(4).zip(corners) {
+                        for c in 0..3 {
+                            lanes[c] = planes[c][first + column];
+                        }
+                    }
+                }
+            }
         }
-        let last = self.nodes.len() - (n_phi + 1);
-        self.nodes.copy_within(last - (n_phi + 1)..last, last);
     }
 
-    /// For each point the sum over the lights of irradiance times cosine times value, in the four rows.
-    fn light(&mut self, frames: impl Iterator<Item = Frame>, lights: &Lights) -> &[Values] {
-        self.frames.clear();
-        self.frames.extend(frames.map(|frame| {
-            [frame.tangent, frame.bitangent, frame.normal].map(|axis| axis.map(|v| v as f32))
-        }));
-        self.sums.clear();
-        self.sums.resize(self.frames.len(), NOTHING);
-        self.arch.dispatch(Lit {
-            grid: self.grid,
-            nodes: &self.nodes,
-            frames: &self.frames,
+    /// The radiance of a point whose view has these weights in the four rows.
+    fn radiance(&mut self, frame: &Frame, lights: &Lights, weights: [f32; 4]) -> [f32; 3] {
+        let sum = self.arch.dispatch(Lit {
+            gathered: self,
+            frame,
             lights,
-            sums: &mut self.sums,
         });
-        &self.sums
+        [0, 1, 2].map(|c| (0..4).map(|row| weights[row] * sum[4 * row + c]).sum())
     }
 }
 
-/// What [`Gathered::light`] does, for whatever vectors the processor has.
+/// The sum over the lights of irradiance times value, in the four rows.
 struct Lit<'a> {
-    grid: Grid,
-    nodes: &'a [Values],
-    /// Tangent, bitangent and normal of each point.
-    frames: &'a [[[f32; 3]; 3]],
+    gathered: &'a mut Gathered,
+    frame: &'a Frame,
     lights: &'a Lights,
-    sums: &'a mut [Values],
 }
 
 impl WithSimd for Lit<'_> {
-    type Output = ();
+    type Output = [f32; 16];
 
-    /// Plain loops: what the processor has of vectors is the compiler's business. Lights are the outer
-    /// loop, since all these points see one of them between the same few nodes.
+    /// Plain loops: what the processor has of vectors is the compiler's business.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let ring = self.grid.n_phi() + 1;
-        for block in &self.lights.0 {
-            for (frame, sum) in self.frames.iter().zip(&mut *self.sums) {
-                let turned = turn(self.grid, frame, block);
-                for lane in 0..LANES {
-                    if turned.cosines[lane] <= LEAST_COSINE as f32 {
-                        continue;
-                    }
-                    let [wa, wb, wc, wd] = turned.weights.map(|weights| weights[lane]);
-                    let first = turned.nodes[lane] as usize;
-                    let around = &self.nodes[first..first + ring + 2];
-                    let (a, b) = (&around[0].0, &around[1].0);
-                    let (c, d) = (&around[ring].0, &around[ring + 1].0);
-                    let e = block.irradiance[lane];
-                    for k in 0..16 {
-                        let value = wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k];
-                        sum.0[k] += e[k % 4] * value;
-                    }
-                }
+    fn with_simd<S: Simd>(self, _: S) -> [f32; 16] {
+        let Gathered {
+            grid, nodes, local, ..
+        } = self.gathered;
+        turn(*grid, self.frame, self.lights, local);
+        let (last, n_phi) = (grid.n_theta() - 1, grid.n_phi());
+        let [cosines, elevations, azimuths] = local;
+        let irradiance = &self.lights.irradiance;
+        let mut sum = [0.0f32; 16];
+        for light in 0..irradiance.len() {
+            let cosine = cosines[light];
+            if cosine <= LEAST_COSINE as f32 {
+                continue;
+            }
+            let t = elevations[light].min(last as f32);
+            let (t0, p0) = (t as i32, azimuths[light] as i32);
+            let (ft, fp) = (t - t0 as f32, azimuths[light] - p0 as f32);
+            let (t0, p0) = (t0 as usize, p0 as usize);
+            // An angle just below zero may be rounded up to a whole turn.
+            let p0 = if p0 < n_phi { p0 } else { 0 };
+            let t1 = (t0 + 1).min(last);
+            let p1 = if p0 + 1 == n_phi { 0 } else { p0 + 1 };
+            let (ring0, ring1) = (t0 * n_phi, t1 * n_phi);
+            let corners = [ring0 + p0, ring0 + p1, ring1 + p0, ring1 + p1];
+            let [a, b, c, d] = corners.map(|node| &nodes[node].0);
+            let (upper, lower) = (cosine * (1.0 - ft), cosine * ft);
+            let (wa, wb) = (upper * (1.0 - fp), upper * fp);
+            let (wc, wd) = (lower * (1.0 - fp), lower * fp);
+            let e = irradiance[light];
+            for k in 0..16 {
+                let value = wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k];
+                sum[k] += e[k % 4] * value;
             }
         }
+        sum
     }
 }
 
-/// Lights as a point sees them.
-struct Turned {
-    cosines: [f32; LANES],
-    /// The first of the four nodes around each, see [`Gathered`].
-    nodes: [u32; LANES],
-    /// Cosine times share of each of the four nodes.
-    weights: [[f32; LANES]; 4],
-}
-
-/// Some lights in a point's frame.
+/// The lights in a point's frame: cosine, and elevation and azimuth in steps of the grid.
 #[inline(always)]
-fn turn(grid: Grid, frame: &[[f32; 3]; 3], lights: &LightBlock) -> Turned {
-    let mut turned = Turned {
-        cosines: [0.0; LANES],
-        nodes: [0; LANES],
-        weights: [[0.0; LANES]; 4],
-    };
-    let (last, n_phi) = (grid.n_theta() as i32 - 1, grid.n_phi() as i32);
-    let steps_from_radians = 1.0 / (grid.step_deg() as f32).to_radians();
-    let [xs, ys, zs] = &lights.towards;
-    for k in 0..LANES {
-        let along = |axis: [f32; 3]| axis[0] * xs[k] + axis[1] * ys[k] + axis[2] * zs[k];
-        let (u, v, w) = (along(frame[0]), along(frame[1]), along(frame[2]));
-        let t = (steps_from_radians * arc((u * u + v * v).sqrt(), w)).min(last as f32);
-        let p = steps_from_radians * arc(v, u);
-        let t0 = t as i32;
-        // An angle just below zero may be rounded up to a whole turn, which is the ring's last node.
-        let p0 = (p as i32).min(n_phi - 1);
-        let (ft, fp) = (t - t0 as f32, p - p0 as f32);
-        let (upper, lower) = (w * (1.0 - ft), w * ft);
-        turned.cosines[k] = w;
-        turned.nodes[k] = (t0 * (n_phi + 1) + p0) as u32;
-        turned.weights[0][k] = upper * (1.0 - fp);
-        turned.weights[1][k] = upper * fp;
-        turned.weights[2][k] = lower * (1.0 - fp);
-        turned.weights[3][k] = lower * fp;
+fn turn(grid: Grid, frame: &Frame, lights: &Lights, local: &mut [Vec<f32>; 3]) {
+    let n = lights.irradiance.len();
+    for array in &mut *local {
+        array.resize(n, 0.0);
     }
-    turned
+    let axes = [frame.tangent, frame.bitangent, frame.normal].map(|axis| axis.map(|v| v as f32));
+    let steps_from_radians = 1.0 / (grid.step_deg() as f32).to_radians();
+    let [xs, ys, zs] = lights.towards.each_ref().map(|axis| &axis[..n]);
+    let [cosines, elevations, azimuths] = local.each_mut().map(|array| &mut array[..n]);
+    for k in 0..n {
+        let along = |axis: [f32; 3]| axis[0] * xs[k] + axis[1] * ys[k] + axis[2] * zs[k];
+        let (u, v, w) = (along(axes[0]), along(axes[1]), along(axes[2]));
+        cosines[k] = w;
+        elevations[k] = steps_from_radians * arc((u * u + v * v).sqrt(), w);
+        azimuths[k] = steps_from_radians * arc(v, u);
+    }
 }
 
 /// `atan2(y, x)` in 0 ..= 2π, within 1e-6, without a branch: several are computed at once.
