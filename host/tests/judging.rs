@@ -113,6 +113,7 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
     write_frame(&path("odd.exr"), &odd).unwrap();
     std::fs::write(path("x.bin"), "short").unwrap();
     std::fs::write(path("x.dat"), "short").unwrap();
+    std::fs::write(path("x.binary"), "short").unwrap();
     std::fs::write(path("x.txt"), "short").unwrap();
     let (dense, out) = (path("d.exr"), path("out.png"));
     let (dense, out) = (text(&dense), text(&out));
@@ -120,8 +121,8 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
     assert_eq!(unknown.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("kurt1 to kurt4"));
     let (odd, bin, dat) = (path("odd.exr"), path("x.bin"), path("x.dat"));
-    let (txt, samples) = (path("x.txt"), path("s.npy"));
-    let cases: [(&[&str], &str); 10] = [
+    let (txt, samples, merl) = (path("x.txt"), path("s.npy"), path("x.binary"));
+    let cases: [(&[&str], &str); 11] = [
         (&["fit", text(&odd), "--model", "ggx"], "7 × 5 pixels"),
         (
             &["fit", dense, "--model", "ggx", "--cells", "3"],
@@ -141,6 +142,7 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
             "7 × 5 pixels",
         ),
         (&["import", text(&bin), "-o", out], "holds 5 bytes"),
+        (&["import", text(&merl), "-o", out], "holds 5 bytes"),
         (&["import", text(&txt), "-o", out], "neither .bin"),
         (&["import", text(&dat), "-o", out], "name it .npy or .csv"),
         (
@@ -298,7 +300,14 @@ fn rivals_are_made_judged_and_shown_in_the_report() {
     // The material is a Kurt model, so that is exact; noise and few samples cost something.
     assert!(error("kurt2") < 1e-3 && error("dense") < 1e-6);
     assert!(error("sparse") < 0.2 && error("strips") > error("kurt2"));
-    gonia_ok(&["report", text(dir.path())], "");
+    let figures = path("figures");
+    gonia_ok(
+        &["report", text(dir.path()), "--figures", text(&figures)],
+        "",
+    );
+    let drawn = std::fs::read_to_string(figures.join("fig8.svg")).unwrap();
+    assert!(drawn.contains(">sadeghi<"));
+    assert!(figures.join("fig2.png").exists() && figures.join("fig9d.svg").exists());
     let page = std::fs::read_to_string(path("report.html")).unwrap();
     assert!(page.contains("Other ways to the same data") && page.contains("image/svg+xml"));
     assert!(page.contains("Models fitted"));

@@ -139,6 +139,13 @@ impl Photo {
             ),
             ("ΔE2000".into(), format!("mean {:.2}", likeness.delta_e)),
         ]);
+        if !likeness.is_cylinder() {
+            eprintln!(
+                "gonia: warning: {}: does not darken from its middle as a cylinder under this light would (correlation of the columns {:.2}); check --box, --light-up and --light-right",
+                self.photo.display(),
+                likeness.across
+            );
+        }
         Ok(())
     }
 }
@@ -156,12 +163,17 @@ fn cut(photo: &Frame, outline: Outline) -> Frame {
     }
 }
 
+/// Columns of a photograph of a cylinder follow its render's at least so well.
+const LEAST_ACROSS: f64 = 0.5;
+
 /// How alike two pictures of one size are.
 struct Likeness {
     /// What the render is multiplied by to be as bright as the photograph, by least squares.
     factor: f32,
     /// Of the luminances, pixel by pixel.
     correlation: f64,
+    /// Of the columns' luminances: what a cylinder's shape shows in, and threads do not.
+    across: f64,
     /// Mean over the pixels, white at the photograph's 99th percentile.
     delta_e: f64,
 }
@@ -175,13 +187,7 @@ impl Likeness {
             .zip(&render.rgb)
             .map(|(a, b)| (light(a), light(b)))
             .unzip();
-        let n = a.len().max(1) as f64;
-        let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         let factor = product(&a, &b) / product(&b, &b).max(1e-30);
-        let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
-        let covariance = product(&a, &b) / n - mean_a * mean_b;
-        let spread =
-            (product(&a, &a) / n - mean_a * mean_a) * (product(&b, &b) / n - mean_b * mean_b);
         let white = white_of(photo);
         let shown = |rgb: &[f32; 3], by: f32| rgb.map(|v| (v * by).clamp(0.0, 1.0));
         let pairs = photo.rgb.iter().zip(&render.rgb);
@@ -193,10 +199,41 @@ impl Likeness {
             .sum();
         Self {
             factor: factor as f32,
-            correlation: covariance / spread.max(1e-30).sqrt(),
-            delta_e: sum / n,
+            correlation: correlation(&a, &b),
+            across: correlation(&columns(&a, photo.width), &columns(&b, photo.width)),
+            delta_e: sum / a.len().max(1) as f64,
         }
     }
+
+    /// Whether the photograph can be one of a cylinder in this light; a wide margin, since the BRDF
+    /// may be another material's.
+    fn is_cylinder(&self) -> bool {
+        self.across >= LEAST_ACROSS
+    }
+}
+
+fn product(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// Pearson's correlation; 0 where one of both does not vary.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().max(1) as f64;
+    let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let about = |values: &[f64], mean: f64| values.iter().map(|v| v - mean).collect::<Vec<f64>>();
+    let (a, b) = (about(a, mean_a), about(b, mean_b));
+    product(&a, &b) / (product(&a, &a) * product(&b, &b)).max(1e-30).sqrt()
+}
+
+/// The sum of each column.
+fn columns(values: &[f64], width: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; width];
+    for row in values.chunks_exact(width) {
+        for (sum, value) in sums.iter_mut().zip(row) {
+            *sum += value;
+        }
+    }
+    sums
 }
 
 /// The luminance that shows as white.
@@ -254,6 +291,35 @@ mod tests {
         assert!(same.delta_e < 1e-3);
         let turned = Likeness::of(&photo, &render(45.0));
         assert!(turned.delta_e > 1.0 && turned.correlation < 0.999);
+        assert!(same.is_cylinder() && turned.is_cylinder());
+    }
+
+    #[test]
+    fn what_is_flat_or_bright_at_its_sides_is_no_cylinder() {
+        let (width, height) = (64, 20);
+        let photo = |light: &dyn Fn(f64, usize) -> f64| Frame {
+            width,
+            height,
+            rgb: (0..width * height)
+                .map(|k| {
+                    let x = 2.0 * ((k % width) as f64 + 0.5) / width as f64 - 1.0;
+                    [light(x, k) as f32; 3]
+                })
+                .collect(),
+        };
+        // Noise of a tenth, by the pixel's number.
+        let noise = |k: usize| 1.0 + 0.2 * ((k * 7919 % 101) as f64 / 101.0 - 0.5);
+        let lights = render::from_above(40.0, 0.0);
+        let fabric = render::bent(&Kurt::two_thread_fabric(), &lights, (width, height), 0.0);
+        let is_cylinder = |frame: &Frame| Likeness::of(frame, &fabric).is_cylinder();
+        // A cylinder of another material, and one whose outline was drawn somewhat too wide.
+        assert!(is_cylinder(&photo(&|x, k| (1.0 - x * x).sqrt() * noise(k))));
+        assert!(is_cylinder(&photo(&|x, k| {
+            (1.0 - (x / 0.9).powi(2)).max(0.0).sqrt() * noise(k)
+        })));
+        assert!(!is_cylinder(&photo(&|_, _| 0.5)));
+        assert!(!is_cylinder(&photo(&|x, k| (0.2 + x * x) * noise(k))));
+        assert!(!is_cylinder(&photo(&|x, k| (1.0 + 0.5 * x) * noise(k))));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::dataset::{DenseFile, Scale};
 use crate::evaluate::compare::Table;
 use crate::evaluate::rivals::{centres, check_grid, coarse, fill_check_cells, measure_on_strips};
 use crate::evaluate::{self, Figures, Options, Side, Stratum, Tabulated};
-use crate::report::folder::{DENSE, RIVALS, TRUTH};
+use crate::report::folder::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
 use crate::report::rivals::{Row, draw_row, figure};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::CellSettings;
@@ -60,6 +60,18 @@ struct Session {
 }
 
 impl Rivals {
+    /// Those of a folder, all with their defaults.
+    pub fn of(folder: PathBuf) -> Self {
+        let fits = FitSettings::default();
+        Self {
+            folder,
+            step: None,
+            without_paper: false,
+            cells: fits.cells,
+            starts: fits.starts,
+        }
+    }
+
     /// The grid that rivals are made on.
     fn grid(&self, own: Grid) -> Result<Grid> {
         let Some(step) = self.step else {
@@ -197,7 +209,10 @@ impl Rivals {
             write_fit(&path(&name), result, session.dense.scale)?;
         }
         comparison.write(&path(RIVALS))?;
-        write_whole_bytes(&path("rivals.svg"), figure(&rows).as_bytes())?;
+        write_whole_bytes(
+            &path(RIVALS_FIGURE).with_extension("svg"),
+            figure(&rows).as_bytes(),
+        )?;
         print(&comparison);
         Ok(())
     }

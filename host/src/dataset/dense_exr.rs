@@ -184,6 +184,55 @@ fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, 
 /// One line naming the file, and the cell where there is one: not an EXR, cut short, not RGB, not
 /// square or of no grid's size, or with values that are NaN or infinite.
 pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
+    let (grid, planes, attributes) = match read_plain(path)? {
+        Some(read) => read,
+        None => read_any(path)?,
+    };
+    let scale = match attributes.get(SCALE).map(String::as_str) {
+        Some("absolute") => Scale::Absolute,
+        Some("relative") | None => Scale::Relative,
+        Some(other) => {
+            return Err(FileError::new(
+                path,
+                format_args!("\"{other}\" is no scale"),
+                "write absolute or relative",
+            )
+            .at(format_args!("attribute {SCALE}")));
+        }
+    };
+    let provenance = attributes
+        .iter()
+        .filter(|(name, _)| *name != SCALE)
+        .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
+        .collect();
+    let brdf = rebuilt(path, grid, planes)?;
+    check_finite(path, &brdf)?;
+    Ok(DenseFile {
+        brdf,
+        scale,
+        provenance,
+    })
+}
+
+/// The grid, the planes and the text attributes of a file.
+type Content = (Grid, [Vec<f32>; 3], BTreeMap<String, String>);
+
+/// A file as gonia writes it, by all threads; `None` when it is another kind, or damaged.
+fn read_plain(path: &Path) -> Result<Option<Content>, FileError> {
+    let Some(reader) = RowReader::open(path)? else {
+        return Ok(None);
+    };
+    let Some(grid) = Grid::from_directions(reader.side()) else {
+        return Ok(None);
+    };
+    let planes = reader
+        .read_all()
+        .map_err(|error| FileError::reading(path, &error))?;
+    Ok(planes.map(|planes| (grid, planes, reader.attributes().clone())))
+}
+
+/// Any square RGB EXR of a grid's size.
+fn read_any(path: &Path) -> Result<Content, FileError> {
     let no_grid = |width, height| {
         let size = format!("is {width} × {height} pixels, which no grid has");
         (
@@ -199,40 +248,22 @@ pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
         let (problem, remedy) = no_grid(image.width, image.height);
         FileError::new(path, problem, remedy)
     })?;
-    let scale = match image.attributes.get(SCALE).map(String::as_str) {
-        Some("absolute") => Scale::Absolute,
-        Some("relative") | None => Scale::Relative,
-        Some(other) => {
-            return Err(FileError::new(
-                path,
-                format_args!("\"{other}\" is no scale"),
-                "write absolute or relative",
-            )
-            .at(format_args!("attribute {SCALE}")));
-        }
-    };
-    let provenance = image
-        .attributes
-        .iter()
-        .filter(|(name, _)| *name != SCALE)
-        .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
-        .collect();
-    let brdf = rebuilt(path, grid, image.planes.map(Plane::into_f32))?;
-    check_finite(path, &brdf)?;
-    Ok(DenseFile {
-        brdf,
-        scale,
-        provenance,
-    })
+    Ok((grid, image.planes.map(Plane::into_f32), image.attributes))
 }
 
 fn check_finite(path: &Path, brdf: &DenseBrdf) -> Result<(), FileError> {
     let grid = brdf.grid();
+    let side = grid.n_directions();
+    // A row at a time without a way out: several values are looked at at once.
+    let is_whole = |row: &[f32]| row.iter().fold(true, |whole, v| whole & v.is_finite());
     for (plane, name) in brdf.planes().iter().zip(["R", "G", "B"]) {
-        let bad = plane.par_iter().position_first(|value| !value.is_finite());
-        if let Some(cell) = bad {
-            let (light, view) = grid.light_and_view(cell);
-            return Err(no_value(path, grid, name, (light, view), plane[cell]));
+        let rows = plane.par_chunks(side);
+        let Some(light) = rows.position_first(|row| !is_whole(row)) else {
+            continue;
+        };
+        let row = &plane[light * side..][..side];
+        if let Some(view) = row.iter().position(|value| !value.is_finite()) {
+            return Err(no_value(path, grid, name, (light, view), row[view]));
         }
     }
     Ok(())

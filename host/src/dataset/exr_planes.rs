@@ -141,7 +141,8 @@ fn missing_channel(path: &Path, name: &str, header: &exr::meta::header::Header) 
     )
 }
 
-fn text_attributes(header: &exr::meta::header::Header) -> BTreeMap<String, String> {
+/// The text attributes of a file, by name.
+pub(super) fn text_attributes(header: &exr::meta::header::Header) -> BTreeMap<String, String> {
     let own = header.own_attributes.other.iter();
     own.chain(&header.shared_attributes.other)
         .filter_map(|(name, value)| match value {

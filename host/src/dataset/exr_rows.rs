@@ -1,11 +1,11 @@
 //! An uncompressed RGB float EXR written and read row by row, in any order: for images that do not fit
-//! memory, and for a few values of a large one.
+//! memory, for a few values of a large one, and for all of them by several threads.
 //!
 //! Such a file is a header, a table of 8-byte offsets, and for each row its number and its length (two
 //! 4-byte integers) before the values of B, G and R, all little-endian.
 
 use super::FileError;
-use super::exr_planes::layer_attributes;
+use super::exr_planes::{layer_attributes, text_attributes};
 use super::whole_file::write_whole;
 use exr::compression::Compression;
 use exr::io::PeekRead;
@@ -13,9 +13,11 @@ use exr::math::Vec2;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData, Requirements, magic_number};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -92,21 +94,68 @@ pub(super) fn write_rows(
     })
 }
 
-/// A file of which single values are read.
+/// A file that is read by rows.
 pub(super) struct RowReader {
     file: File,
+    /// Where each row begins.
     offsets: Vec<u64>,
+    /// The number of the first row in the file.
+    first: i32,
+    attributes: BTreeMap<String, String>,
 }
 
 impl RowReader {
     /// Opens a square image. `None` when it is not of the plain kind that this module writes, or no
-    /// EXR at all: who reads whole files says what is wrong with it.
+    /// EXR at all: who reads any EXR says what is wrong with it.
     pub fn open(path: &Path) -> Result<Option<Self>, FileError> {
         let file = File::open(path).map_err(|error| FileError::reading(path, &error))?;
-        let Some(offsets) = offsets_of_rows(&file) else {
-            return Ok(None);
+        Ok(Self::of_plain(file))
+    }
+
+    /// `None` unless the file is plain and as long as it should be.
+    fn of_plain(file: File) -> Option<Self> {
+        let mut read = PeekRead::new(BufReader::new(&file));
+        magic_number::validate_exr(&mut read).ok()?;
+        let requirements = Requirements::read(&mut read).ok()?;
+        requirements.validate().ok()?;
+        let headers = Header::read_all(&mut read, &requirements, false).ok()?;
+        let [header] = headers.as_slice() else {
+            return None;
         };
-        Ok(Some(Self { file, offsets }))
+        let channels = &header.channels.list;
+        let named = channels.len() == CHANNELS.len()
+            && channels.iter().zip(CHANNELS).all(|(channel, (name, _))| {
+                channel.name.eq(name)
+                    && channel.sample_type == SampleType::F32
+                    && channel.sampling == Vec2(1, 1)
+            });
+        let side = header.layer_size.width();
+        let plain = named
+            && header.compression == Compression::Uncompressed
+            && header.blocks == BlockDescription::ScanLines
+            && !header.deep
+            && header.layer_size.height() == side;
+        if !plain {
+            return None;
+        }
+        let first = header.own_attributes.layer_position.y();
+        let attributes = text_attributes(header);
+        let offsets = MetaData::read_offset_tables(&mut read, &headers)
+            .ok()?
+            .into_iter()
+            .next()?;
+        let length = file.metadata().ok()?.len();
+        let whole = |offset: &u64| {
+            let end = offset.checked_add(ROW_HEAD + 12 * side as u64);
+            end.is_some_and(|end| end <= length)
+        };
+        let is_whole = offsets.len() == side && offsets.iter().all(whole);
+        is_whole.then_some(Self {
+            file,
+            offsets,
+            first,
+            attributes,
+        })
     }
 
     /// Rows, and columns.
@@ -114,57 +163,53 @@ impl RowReader {
         self.offsets.len()
     }
 
+    /// The text attributes of the file, by name.
+    pub fn attributes(&self) -> &BTreeMap<String, String> {
+        &self.attributes
+    }
+
     /// The value of a pixel.
-    pub fn value(&mut self, row: usize, column: usize) -> io::Result<[f32; 3]> {
+    pub fn value(&self, row: usize, column: usize) -> io::Result<[f32; 3]> {
         let mut value = [0.0; 3];
         for (place, (_, channel)) in CHANNELS.iter().enumerate() {
-            let before = (place * self.offsets.len() + column) as u64;
-            let at = self.offsets[row] + ROW_HEAD + 4 * before;
+            let before = (place * self.side() + column) as u64;
             let mut bytes = [0; 4];
-            self.file.seek(SeekFrom::Start(at))?;
-            self.file.read_exact(&mut bytes)?;
+            let at = self.offsets[row] + ROW_HEAD + 4 * before;
+            self.file.read_exact_at(&mut bytes, at)?;
             value[*channel] = f32::from_le_bytes(bytes);
         }
         Ok(value)
     }
-}
 
-/// Where each row begins; `None` unless the file is plain and as long as it should be.
-fn offsets_of_rows(file: &File) -> Option<Vec<u64>> {
-    let mut read = PeekRead::new(BufReader::new(file));
-    magic_number::validate_exr(&mut read).ok()?;
-    let requirements = Requirements::read(&mut read).ok()?;
-    requirements.validate().ok()?;
-    let headers = Header::read_all(&mut read, &requirements, false).ok()?;
-    let [header] = headers.as_slice() else {
-        return None;
-    };
-    let channels = &header.channels.list;
-    let named = channels.len() == CHANNELS.len()
-        && channels.iter().zip(CHANNELS).all(|(channel, (name, _))| {
-            channel.name.eq(name)
-                && channel.sample_type == SampleType::F32
-                && channel.sampling == Vec2(1, 1)
-        });
-    let side = header.layer_size.width();
-    let plain = named
-        && header.compression == Compression::Uncompressed
-        && header.blocks == BlockDescription::ScanLines
-        && !header.deep
-        && header.layer_size.height() == side;
-    if !plain {
-        return None;
+    /// All of it, R, G and B, by all threads; `None` when a row is not where the file says.
+    pub fn read_all(&self) -> io::Result<Option<[Vec<f32>; 3]>> {
+        let side = self.side();
+        let mut planes = [(); 3].map(|()| vec![0.0; side * side]);
+        let [red, green, blue] = &mut planes;
+        let rows = red
+            .par_chunks_mut(side)
+            .zip(green.par_chunks_mut(side))
+            .zip(blue.par_chunks_mut(side));
+        let in_place = rows.enumerate().map_init(
+            || vec![0; ROW_HEAD as usize + 12 * side],
+            |bytes, (row, ((red, green), blue))| {
+                self.file.read_exact_at(bytes, self.offsets[row])?;
+                let (head, values) = bytes.split_at(ROW_HEAD as usize);
+                let number = i64::from(self.first) + row as i64;
+                let expected = [number as i32, 12 * side as i32].map(i32::to_le_bytes);
+                let out = [red, green, blue];
+                for (bytes, (_, channel)) in values.chunks_exact(4 * side).zip(CHANNELS) {
+                    let values = bytes.as_chunks().0.iter();
+                    for (value, bytes) in out[channel].iter_mut().zip(values) {
+                        *value = f32::from_le_bytes(*bytes);
+                    }
+                }
+                Ok::<_, io::Error>(head == expected.as_flattened())
+            },
+        );
+        let in_place = in_place.try_reduce(|| true, |a, b| Ok(a && b))?;
+        Ok(in_place.then_some(planes))
     }
-    let offsets = MetaData::read_offset_tables(&mut read, &headers)
-        .ok()?
-        .into_iter()
-        .next()?;
-    let length = file.metadata().ok()?.len();
-    let whole = |offset: &u64| {
-        let end = offset.checked_add(ROW_HEAD + 12 * side as u64);
-        end.is_some_and(|end| end <= length)
-    };
-    offsets.iter().all(whole).then_some(offsets)
 }
 
 #[cfg(test)]
@@ -197,10 +242,13 @@ mod tests {
         })
         .unwrap();
         assert_eq!(image.attributes, attributes);
-        let mut reader = RowReader::open(&path).unwrap().unwrap();
+        let reader = RowReader::open(&path).unwrap().unwrap();
         assert_eq!(reader.side(), side);
+        assert_eq!(reader.attributes(), &attributes);
+        let whole = reader.read_all().unwrap().unwrap();
         for (c, read) in image.planes.into_iter().enumerate() {
             let read = read.into_f32();
+            assert_eq!(read, whole[c]);
             for row in 0..side {
                 assert_eq!(read[row * side..(row + 1) * side], plane(c, row));
                 assert_eq!(reader.value(row, 7).unwrap()[c], plane(c, row)[7]);
@@ -224,5 +272,22 @@ mod tests {
         let file = File::options().write(true).open(&path).unwrap();
         file.set_len(length - 1).unwrap();
         assert!(RowReader::open(&path).unwrap().is_none());
+    }
+
+    #[test]
+    fn rows_that_are_not_where_the_file_says_are_not_taken_for_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.exr");
+        let row = [0.5; 12];
+        write_rows(&path, 12, &BTreeMap::new(), |writer| {
+            (0..12).try_for_each(|k| writer.write(k, [&row; 3]))
+        })
+        .unwrap();
+        let reader = RowReader::open(&path).unwrap().unwrap();
+        assert!(reader.read_all().unwrap().is_some());
+        let file = File::options().write(true).open(&path).unwrap();
+        file.write_all_at(&7i32.to_le_bytes(), reader.offsets[3])
+            .unwrap();
+        assert!(reader.read_all().unwrap().is_none());
     }
 }

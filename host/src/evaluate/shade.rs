@@ -8,7 +8,6 @@
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::shading::{Frame, LEAST_COSINE, Light};
 use gonia_brdf::{DenseBrdf, Direction, Grid};
-use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Groups of points a thread takes at a time, so that neighbouring rows are read together.
@@ -142,7 +141,6 @@ struct Gathered {
     grid: Grid,
     nodes: Vec<Values>,
     local: [Vec<f32>; 3],
-    arch: Arch,
 }
 
 impl Gathered {
@@ -151,7 +149,6 @@ impl Gathered {
             grid,
             nodes: vec![Values([0.0; 16]); grid.n_directions()],
             local: Default::default(),
-            arch: Arch::new(),
         }
     }
 
@@ -184,35 +181,17 @@ impl Gathered {
 
     /// The radiance of a point whose view has these weights in the four rows.
     fn radiance(&mut self, frame: &Frame, lights: &Lights, weights: [f32; 4]) -> [f32; 3] {
-        let sum = self.arch.dispatch(Lit {
-            gathered: self,
-            frame,
-            lights,
-        });
+        let sum = self.lit(frame, lights);
         [0, 1, 2].map(|c| (0..4).map(|row| weights[row] * sum[4 * row + c]).sum())
     }
-}
 
-/// The sum over the lights of irradiance times value, in the four rows.
-struct Lit<'a> {
-    gathered: &'a mut Gathered,
-    frame: &'a Frame,
-    lights: &'a Lights,
-}
-
-impl WithSimd for Lit<'_> {
-    type Output = [f32; 16];
-
-    /// Plain loops: what the processor has of vectors is the compiler's business.
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [f32; 16] {
-        let Gathered {
-            grid, nodes, local, ..
-        } = self.gathered;
-        turn(*grid, self.frame, self.lights, local);
+    /// The sum over the lights of irradiance times value, in the four rows.
+    fn lit(&mut self, frame: &Frame, lights: &Lights) -> [f32; 16] {
+        let Gathered { grid, nodes, local } = self;
+        turn(*grid, frame, lights, local);
         let (last, n_phi) = (grid.n_theta() - 1, grid.n_phi());
         let [cosines, elevations, azimuths] = local;
-        let irradiance = &self.lights.irradiance;
+        let irradiance = &lights.irradiance;
         let mut sum = [0.0f32; 16];
         for light in 0..irradiance.len() {
             let cosine = cosines[light];

@@ -135,8 +135,10 @@ pub fn seconds(value: f64) -> String {
         format!("{value:.2} s")
     } else if value < 120.0 {
         format!("{value:.1} s")
-    } else {
+    } else if value < 7200.0 {
         format!("{}:{:02} min", (value / 60.0) as u64, (value % 60.0) as u64)
+    } else {
+        format!("{:.1} h", value / 3600.0)
     }
 }
 
@@ -154,6 +156,7 @@ mod tests {
         assert_eq!(thousands(999), "999");
         assert_eq!(seconds(4.567), "4.57 s");
         assert_eq!(seconds(187.9), "3:07 min");
+        assert_eq!(seconds(972_000.0), "270.0 h");
         assert_eq!(trimmed(0.03), "0.03");
     }
 

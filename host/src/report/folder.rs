@@ -1,6 +1,6 @@
 //! The report of a folder that a run left behind.
 
-use super::{ReportInput, write_report};
+use super::{ReportInput, write_figures, write_report};
 use crate::dataset::cell_mask::read_mask;
 use crate::dataset::dense_exr::read_dense;
 use crate::dataset::fit_toml::FitNote;
@@ -23,6 +23,8 @@ pub const MEASURED: &str = "measured.npy";
 pub const ERRORS: &str = "error.exr";
 /// The comparison of `gonia rivals`.
 pub const RIVALS: &str = "rivals.toml";
+/// The figure of that comparison, without its extension.
+pub const RIVALS_FIGURE: &str = "rivals";
 /// The rig.
 pub const RIG: &str = "rig.toml";
 /// The report.
@@ -30,12 +32,13 @@ pub const REPORT: &str = "report.html";
 
 /// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there
 /// `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
-/// (`*.fit.toml`) and charts (`*.svg`). Returns its path.
+/// (`*.fit.toml`) and charts (`*.svg`); and the paper's figures into a second folder, if one is given.
+/// Returns the paths of what it wrote, the report first.
 ///
 /// # Errors
 /// One line naming the file: no dense BRDF, a file that cannot be used, a truth of another grid, or
 /// the report cannot be written.
-pub fn report_folder(folder: &Path) -> Result<PathBuf, FileError> {
+pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Vec<PathBuf>, FileError> {
     let file = read_dense(&folder.join(DENSE))?;
     let summary_path = folder.join(SUMMARY);
     let summary = if summary_path.exists() {
@@ -72,20 +75,22 @@ pub fn report_folder(folder: &Path) -> Result<PathBuf, FileError> {
     let charts = charts_of(folder);
     let truth = truth.as_ref().map(Tabulated::new);
     let report = folder.join(REPORT);
-    write_report(
-        &report,
-        &ReportInput {
-            truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
-            measured: measured.as_ref(),
-            errors: errors.as_ref(),
-            rig: rig.as_ref(),
-            fits: &fits,
-            rivals: rivals.as_ref(),
-            charts: &charts,
-            ..ReportInput::new(&summary, &file.brdf)
-        },
-    )?;
-    Ok(report)
+    let input = ReportInput {
+        truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
+        measured: measured.as_ref(),
+        errors: errors.as_ref(),
+        rig: rig.as_ref(),
+        fits: &fits,
+        rivals: rivals.as_ref(),
+        charts: &charts,
+        ..ReportInput::new(&summary, &file.brdf)
+    };
+    write_report(&report, &input)?;
+    let mut written = vec![report];
+    if let Some(figures) = figures {
+        written.extend(write_figures(figures, &input)?);
+    }
+    Ok(written)
 }
 
 /// A table beside the dense BRDF, of the same grid; `None` where it is not there.
@@ -141,15 +146,15 @@ mod tests {
     #[test]
     fn a_folder_with_nothing_but_a_dense_brdf_has_a_report() {
         let dir = tempfile::tempdir().unwrap();
-        let error = report_folder(dir.path()).unwrap_err().to_string();
+        let error = report_folder(dir.path(), None).unwrap_err().to_string();
         assert!(
             error.contains("dense.exr") && error.ends_with("check the path"),
             "{error}"
         );
 
         write_dense(&dir.path().join(DENSE), flat(30.0, 0.3)).unwrap();
-        let report = report_folder(dir.path()).unwrap();
-        let text = std::fs::read_to_string(report).unwrap();
+        let report = report_folder(dir.path(), None).unwrap();
+        let text = std::fs::read_to_string(&report[0]).unwrap();
         assert!(text.contains("values in 1/sr") && text.contains("seed"));
         assert!(!text.contains("Measured against true"));
     }
@@ -165,12 +170,12 @@ mod tests {
         Summary::new("silk", Scale::Absolute)
             .write(&dir.path().join(SUMMARY))
             .unwrap();
-        let text = std::fs::read_to_string(report_folder(dir.path()).unwrap()).unwrap();
+        let text = std::fs::read_to_string(&report_folder(dir.path(), None).unwrap()[0]).unwrap();
         assert!(text.contains("<h1>silk</h1>") && text.contains("Measured against true"));
         assert!(text.contains("Measured bins"));
 
         write_dense(&dir.path().join(TRUTH), flat(15.0, 0.31)).unwrap();
-        let error = report_folder(dir.path()).unwrap_err().to_string();
+        let error = report_folder(dir.path(), None).unwrap_err().to_string();
         assert!(error.contains("truth.exr: is of another grid"), "{error}");
     }
 }

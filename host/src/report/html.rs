@@ -1,6 +1,7 @@
 //! The page: what a reader sees, in its order.
 
 use super::charts::{self, seconds, thousands};
+use super::folder::RIVALS_FIGURE;
 use super::subspaces::Subspace;
 use super::{ReportInput, explorer, fits, panels, rivals, shots, slices, spans, subspaces};
 use crate::dataset::summary::{FrameCounts, Pointing};
@@ -9,7 +10,8 @@ use crate::evaluate::Figures;
 use gonia_brdf::{Brdf, Grid};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-const STYLE: &str = include_str!("style.css");
+/// The style of the page, and of what is drawn for it.
+pub const STYLE: &str = include_str!("style.css");
 
 /// The whole page.
 pub fn page(input: &ReportInput<'_>) -> Markup {
@@ -36,7 +38,7 @@ pub fn page(input: &ReportInput<'_>) -> Markup {
                     (explorer::section(input.dense, unit_of(summary)))
                     (slice_sheets(input))
                     @if let Some(figures) = &summary.figures { (figures_table(figures)) }
-                    (rivals::section(input.rivals))
+                    (rivals::section(input.rivals, rivals_figure(input.charts)))
                     (fits::section(input.fits))
                     (session_charts(input, grid))
                     (charts_beside(input.charts))
@@ -70,7 +72,8 @@ fn cards(summary: &Summary, grid: Grid) -> Markup {
     html! {
         div.cards {
             @if let Some(poses) = summary.poses {
-                (card(&thousands(poses.reached), "", &format!("poses reached, plan of {}", thousands(poses.planned))))
+                @let of = if poses.reached > poses.planned { ", those of the reference among them" } else { "" };
+                (card(&thousands(poses.reached), "", &format!("poses reached{of}, plan of {}", thousands(poses.planned))))
             }
             @if let Some(frames) = &summary.frames { (frames_card(frames)) }
             @if let Some(pointing) = &summary.pointing { (pointing_card(pointing)) }
@@ -139,7 +142,7 @@ fn provenance(summary: &Summary) -> Markup {
 }
 
 /// What the values are: 1/sr only where the file says so.
-fn unit_of(summary: &Summary) -> &'static str {
+pub fn unit_of(summary: &Summary) -> &'static str {
     match summary.scale {
         Scale::Relative => "(relative)",
         Scale::Absolute => "1/sr",
@@ -232,14 +235,25 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
         p.soft { "The paper's Fig. 9 b to d, measured; the scale of colours is that of the slices above." }
         div.sheets {
             @for subspace in Subspace::ALL {
-                (sheet(subspaces::sheet(input.dense, subspace, factor, white), subspace.name(), "measured"))
+                @let drawing = subspaces::sheet(input.dense, subspace, factor, white);
+                (sheet(html! { div.wide.fine { (drawing) } }, subspace.name(), "measured"))
             }
         }
     }
 }
 
+/// The figure of the rivals, where it is among the charts.
+fn rivals_figure(charts: &[(String, String)]) -> Option<String> {
+    let figure = charts.iter().find(|(name, _)| name == RIVALS_FIGURE);
+    figure.map(|(_, svg)| svg_uri(svg))
+}
+
 /// Charts that others made, as they are; the page's style does not reach into an image.
 fn charts_beside(charts: &[(String, String)]) -> Markup {
+    let charts: Vec<_> = charts
+        .iter()
+        .filter(|(name, _)| name != RIVALS_FIGURE)
+        .collect();
     html! {
         @if !charts.is_empty() {
             h2 { "Cost and accuracy" }

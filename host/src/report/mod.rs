@@ -6,6 +6,7 @@
 mod charts;
 mod color_map;
 mod explorer;
+mod figures;
 mod fits;
 pub mod folder;
 pub mod frontier;
@@ -21,6 +22,7 @@ mod subspaces;
 mod svg;
 pub mod tone;
 
+pub use figures::write_figures;
 pub use folder::report_folder;
 pub use motion::motion_chart;
 

@@ -7,8 +7,8 @@ use crate::evaluate::{Figures, Stratum, Tabulated};
 use gonia_brdf::{Brdf, DenseBrdf, Direction};
 use maud::{Markup, PreEscaped, html};
 
-/// The table; nothing without a comparison.
-pub fn section(rivals: Option<&Rivals>) -> Markup {
+/// The table, and the figure (an image's address) where there is one; nothing without a comparison.
+pub fn section(rivals: Option<&Rivals>, figure: Option<String>) -> Markup {
     let Some(rivals) = rivals else {
         return html! {};
     };
@@ -28,6 +28,15 @@ pub fn section(rivals: Option<&Rivals>) -> Markup {
             } }
             tbody { @for row in &rivals.rows { (table_row(row, has_truth)) } }
         } }
+        @if let Some(uri) = figure {
+            figure.chart {
+                img src=(uri) alt="a slice and three renders of each way";
+                figcaption {
+                    "The paper's Fig. 8: a slice over both azimuths at 74°/74° and three renders; each column at \
+                     the exposure of its first row."
+                }
+            }
+        }
     }
 }
 
@@ -119,7 +128,7 @@ pub fn figure(rows: &[Row]) -> String {
         "φi against φv at 74°/74°",
         "sphere, light from above",
         "sphere, sky of 512 lights",
-        "draped cylinder",
+        "cylinder, light from above",
     ];
     let place = |column: usize, row: usize| {
         (
@@ -181,6 +190,6 @@ mod tests {
         let drawn = figure(&rows);
         assert_eq!(drawn.matches("<image").count(), 8);
         assert!(drawn.contains(">dense<") && drawn.contains(">kurt2<"));
-        assert!(section(None).into_string().is_empty());
+        assert!(section(None, None).into_string().is_empty());
     }
 }

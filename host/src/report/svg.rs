@@ -1,5 +1,6 @@
 //! The few things that every chart has.
 
+use super::html::STYLE;
 use maud::{Markup, html};
 
 /// A number for an attribute, with no more decimals than a screen shows.
@@ -37,6 +38,37 @@ pub fn drawing(w: f64, h: f64, name: &str, inside: Markup) -> Markup {
         svg viewBox=(format!("0 0 {} {}", n(w), n(h))) role="img" aria-label=(name)
             style=(format!("max-width:{}px", n(1.5 * w))) { (inside) }
     }
+}
+
+/// A drawing of the page as a file of its own, in the page's light colours.
+pub fn alone(drawing: Markup) -> String {
+    let rules: String = STYLE
+        .lines()
+        .filter(|line| line.starts_with("svg text") || line.starts_with("svg ."))
+        .collect();
+    let head = format!(
+        "<style>{rules}</style><rect width=\"100%\" height=\"100%\" fill=\"var(--card)\"/>"
+    );
+    let drawing = drawing.into_string();
+    let text = match drawing.split_once('>') {
+        Some((tag, rest)) => {
+            let tag = tag.replacen("<svg", "<svg xmlns=\"http://www.w3.org/2000/svg\"", 1);
+            format!("{tag}>{head}{rest}")
+        }
+        None => drawing,
+    };
+    light_colours().fold(text, |text, (name, value)| {
+        text.replace(&format!("var({name})"), value)
+    })
+}
+
+/// The names and values of the page's light colours: the first block of its style.
+fn light_colours() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let block = STYLE.split('}').next().unwrap_or_default();
+    block
+        .split([';', '{'])
+        .filter_map(|rule| rule.trim().split_once(": "))
+        .filter(|(name, _)| name.starts_with("--"))
 }
 
 /// The least "round" number (1, 2, 5 times a power of ten) that is at least `value`.
