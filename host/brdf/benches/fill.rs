@@ -29,7 +29,7 @@ fn main() {
             .position(|a| a == name)
             .map_or(default, |k| arguments[k + 1].parse().expect("a number"))
     };
-    let names = ["matte", "broad", "fabric", "sharp", "sharper"];
+    let names = plan::MATERIALS;
     let asked: Vec<&str> = names
         .into_iter()
         .filter(|n| arguments.iter().any(|a| a == n))

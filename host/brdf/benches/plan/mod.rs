@@ -2,12 +2,18 @@
 
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
-use gonia_brdf::model::{Kurt, KurtLobe};
+use gonia_brdf::model::{Ggx, Kurt, KurtLobe, Ward};
 use gonia_brdf::{Brdf, Direction, Sample};
 use rayon::prelude::*;
 
 /// Standard deviation of the noise, relative.
 pub const NOISE: f64 = 0.015;
+
+/// All names that [`material`] knows.
+#[allow(dead_code)] // Some benches need one only.
+pub const MATERIALS: [&str; 8] = [
+    "matte", "broad", "fabric", "sharp", "sharper", "round", "ggx", "ward",
+];
 
 pub fn material(name: &str) -> Box<dyn Brdf> {
     let lobe = |specular: f64, mx, my| KurtLobe {
@@ -18,10 +24,30 @@ pub fn material(name: &str) -> Box<dyn Brdf> {
         alpha: 0.3,
         azimuth_deg: 31.0,
     };
+    if name == "ggx" {
+        return Box::new(Ggx {
+            diffuse: [0.1, 0.2, 0.3],
+            specular: [1.0; 3],
+            f0: 0.04,
+            alpha_x: 0.1,
+            alpha_y: 0.2,
+            azimuth_deg: 77.0,
+        });
+    }
+    if name == "ward" {
+        return Box::new(Ward {
+            diffuse: [0.3, 0.2, 0.1],
+            specular: [0.1; 3],
+            alpha_x: 0.08,
+            alpha_y: 0.3,
+            azimuth_deg: 12.0,
+        });
+    }
     Box::new(match name {
         "matte" => Kurt::white_reference_fabric(),
         "broad" => Kurt::new([0.2, 0.15, 0.1], &[lobe(2.0, 0.15, 0.4)]),
         "sharp" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.05, 0.3)]),
+        "round" => Kurt::new([0.1, 0.2, 0.15], &[lobe(0.9, 0.07, 0.07)]),
         "sharper" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.03, 0.12)]),
         _ => Kurt::two_thread_fabric(),
     })

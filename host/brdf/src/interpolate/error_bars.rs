@@ -1,9 +1,11 @@
-//! Standard errors: of measured cells from the spread inside bins, of all others from the variance
-//! of the blocks, calibrated on bins held out.
+//! Standard errors: the variance of the blocks, calibrated on bins held out. The value of a measured
+//! cell is a block's too, which its samples take part in by their number and their spread, so that its
+//! standard error is found in the same way.
 //!
 //! A block's own variance is a guess: it rests on one kernel and on few nodes. How far off it is,
 //! is measured on held-out bins, class by class (elevation, brightness, and size of the guess): each class gets
-//! the factor with which 95 % of its bins lie within 1.96 standard errors.
+//! the factor with which 95 % of its bins lie within 1.96 standard errors, the bins' own noise
+//! included. Where that noise hides the error of the guess, the factor stays near the usual one.
 
 use super::Settings;
 use super::hold_out::{HoldOut, Prediction};
@@ -21,16 +23,27 @@ pub const Z95: f32 = 1.96;
 const TESTS: usize = 12_000;
 /// One frame in so many is held out.
 const ONE_IN: u32 = 24;
-/// Classes by size of the guess, at most, for each part of the domain …
+/// A class by size of the guess holds one in so many of a part of the domain, at most …
 const SIZES: usize = 8;
-/// … and bins in one, at least: fewer cannot tell a 95th percentile.
+/// … and bins at least: fewer cannot tell a 95th percentile …
 const CLASS_MIN: usize = 100;
+/// … and is no wider than by this factor where there are enough: cells of a sparse plan lie where few
+/// of its own bins do.
+const CLASS_SPAN: f32 = 2.0;
 /// Elevations above this are a class of their own: views end there, degrees.
 const GRAZING_DEG: f64 = 75.0;
-/// Standard error of a median of normal values over that of their mean.
-const MEDIAN_OVER_MEAN: f32 = 1.2533;
-/// So many samples tell their own spread; fewer take the material's.
-const COUNT_MIN: u32 = 6;
+/// What most materials need for a factor where noise alone makes the error: their values are smoother
+/// than the kernel takes them for (docs/results.md) …
+const USUAL_FACTOR: f32 = 0.9;
+/// … give or take this share of its square.
+const USUAL_SPREAD: f32 = 0.5;
+/// Standard deviation of a 95th percentile of squares of normal values over their 95th percentile,
+/// times the root of their number: `2 √(0.05 · 0.95) / (1.96 · 2 φ(1.96))`, φ the normal density.
+const PERCENTILE_SPREAD: f32 = 1.9;
+/// So well is the variance of the bins' noise known, as a share.
+const NOISE_SPREAD: f32 = 0.1;
+/// A bin whose predicted variance is less than this share of its noise's tells of the noise alone.
+const NOISE_ALONE: f32 = 0.1;
 
 /// Where a cell's value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +89,16 @@ pub struct Calibration {
     parts: [Classes; 4],
     /// Mean logarithm over the channels above which a value is bright.
     bright: f32,
-    noise_variance: f32,
+    noise: BinNoise,
+}
+
+/// The noise of bins: how far a bin's median lies from the true value at its mean direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct BinNoise {
+    /// Variance of the logarithm of one sample.
+    variance: f32,
+    /// What bins show of it in fact, over what their samples' number and spread say.
+    factor: f32,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -109,10 +131,11 @@ impl Calibration {
         logs.sort_by(f32::total_cmp);
         // The brightest tenth of all is about half of the bins that a hold-out picks.
         let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
+        let noise = BinNoise::new(predictions, noise_variance);
         let mut calibration = Self {
-            parts: [(); 4].map(|()| Classes::new(&[], noise_variance)),
+            parts: [(); 4].map(|()| Classes::new(&[], &noise)),
             bright,
-            noise_variance,
+            noise,
         };
         let all: Vec<&Prediction> = predictions.iter().collect();
         for part in 0..4 {
@@ -122,8 +145,7 @@ impl Calibration {
             };
             let own: Vec<&Prediction> = all.iter().copied().filter(of_part).collect();
             let enough = own.len() >= CLASS_MIN;
-            calibration.parts[part] =
-                Classes::new(if enough { &own } else { &all }, noise_variance);
+            calibration.parts[part] = Classes::new(if enough { &own } else { &all }, &noise);
         }
         calibration
     }
@@ -145,50 +167,115 @@ impl Calibration {
         variance.map(|v| factor * v.max(0.0).sqrt())
     }
 
-    /// Standard error of the logarithm of a measured cell: of the median of its samples.
-    pub fn of_measured(&self, bin: &Bin) -> [f32; 3] {
-        [0, 1, 2].map(|c| {
-            let own = SIGMA_PER_MAD * bin.mad[c] / bin.median[c].abs();
-            let usual = self.noise_variance.sqrt();
-            let sigma = if bin.count >= COUNT_MIN && own.is_finite() {
-                own.max(0.3 * usual)
-            } else {
-                usual
-            };
-            let of_median = if bin.count > 2 { MEDIAN_OVER_MEAN } else { 1.0 };
-            of_median * sigma / (bin.count.max(1) as f32).sqrt()
-        })
-    }
-
     /// Whether a held-out bin lies within the 95 % interval of its prediction, the noise of its own
     /// samples included; of the channels that can be told.
     pub fn covers<'a>(&'a self, prediction: &'a Prediction) -> impl Iterator<Item = bool> + 'a {
         let bin = prediction.bin;
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
         let error = self.standard_error(light, view, prediction.log, prediction.variance);
-        let noise = self.noise_variance / bin.count as f32;
         (0..3).filter_map(move |c| {
             let residual = prediction.residual(c)?;
+            let noise = self.noise.of(bin, c);
             Some(residual.powi(2) <= Z95 * Z95 * (error[c] * error[c] + noise))
         })
     }
 }
 
+impl BinNoise {
+    /// Finds the factor on bins that tell of noise alone; without enough of them it is 1.
+    fn new(predictions: &[Prediction], variance: f32) -> Self {
+        let stated = Self {
+            variance,
+            factor: 1.0,
+        };
+        let mut factors: Vec<f32> = residuals(predictions.iter(), &stated)
+            .map(|r| (r.noise, USUAL_FACTOR.powi(2) * r.variance, r.limit))
+            .filter(|(noise, error, _)| *error < NOISE_ALONE * noise)
+            .map(|(noise, error, limit)| (limit - error) / noise)
+            .collect();
+        let enough = factors.len() >= 3 * CLASS_MIN;
+        let factor = enough.then(|| percentile_95(&mut factors)).flatten();
+        Self {
+            factor: factor.unwrap_or(1.0).clamp(0.5, 2.0),
+            ..stated
+        }
+    }
+
+    /// Variance of the logarithm of a bin's median about the true value at the mean direction, of one
+    /// channel.
+    fn of(&self, bin: &Bin, channel: usize) -> f32 {
+        let of_median = of_median(bin.count);
+        let spread = SIGMA_PER_MAD * bin.mad[channel] / bin.median[channel].abs();
+        // What the samples scatter by beyond the noise, they do by their places: the mean of these is the
+        // bin's, and a median is only off as far as it is not the mean.
+        let slope = (spread * spread - self.variance).max(0.0);
+        let slope = if slope.is_finite() { slope } else { 0.0 };
+        self.factor * (of_median * self.variance + (of_median - 1.0) * slope)
+            / bin.count.max(1) as f32
+    }
+}
+
+/// Variance of the median of normal values over that of their mean, within 2 % of
+/// the exact ratios for 1 to 10 values.
+fn of_median(count: u32) -> f32 {
+    use std::f32::consts::FRAC_PI_2;
+    let n = count.max(1) as f32;
+    let fewer = if count.is_multiple_of(2) {
+        1.3
+    } else {
+        FRAC_PI_2 - 1.0
+    };
+    (FRAC_PI_2 * n / (n + fewer)).max(1.0)
+}
+
+/// A residual of one channel.
+struct Residual {
+    /// The variance with which the residual just lies within a 95 % interval.
+    limit: f32,
+    /// That of the prediction, not calibrated.
+    variance: f32,
+    /// That of the bin.
+    noise: f32,
+}
+
+fn residuals<'a>(
+    predictions: impl Iterator<Item = &'a Prediction<'a>>,
+    noise: &BinNoise,
+) -> impl Iterator<Item = Residual> {
+    predictions.flat_map(|p| {
+        (0..3).filter_map(|c| {
+            Some(Residual {
+                limit: (p.residual(c)? / Z95).powi(2),
+                variance: p.variance[c].max(1e-12),
+                noise: noise.of(p.bin, c),
+            })
+        })
+    })
+}
+
 impl Classes {
-    fn new(predictions: &[&Prediction], noise_variance: f32) -> Self {
-        let mut sorted: Vec<(f32, &Prediction)> =
-            predictions.iter().map(|p| (size(p.variance), *p)).collect();
-        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    fn new(predictions: &[&Prediction], noise: &BinNoise) -> Self {
+        let mut sorted: Vec<&Prediction> = predictions.to_vec();
+        sorted.sort_by(|a, b| size(a.variance).total_cmp(&size(b.variance)));
         let length = sorted.len().div_ceil(SIZES).max(CLASS_MIN);
         let mut limits = Vec::new();
         let mut factors = Vec::new();
-        for class in sorted.chunks(length) {
-            limits.push(class.last().map_or(0.0, |last| last.0));
-            factors.push(factor_of(class, noise_variance));
+        let mut rest = &sorted[..];
+        while let Some(first) = rest.first() {
+            let within = CLASS_SPAN * size(first.variance);
+            let near = rest.partition_point(|p| size(p.variance) <= within);
+            let mut n = near.clamp(CLASS_MIN, length).min(rest.len());
+            if rest.len() - n < CLASS_MIN {
+                n = rest.len();
+            }
+            let (class, others) = rest.split_at(n);
+            limits.extend(class.last().map(|last| size(last.variance)));
+            factors.push(factor_of(class, noise));
+            rest = others;
         }
         limits.pop();
         if factors.is_empty() {
-            factors.push(1.0);
+            factors.push(USUAL_FACTOR);
         }
         Self { limits, factors }
     }
@@ -200,24 +287,33 @@ impl Classes {
 }
 
 /// The factor with which 95 % of the residuals lie within 1.96 standard errors: of each residual the
-/// factor that just reaches it, and of these the 95th percentile.
-fn factor_of(class: &[(f32, &Prediction)], noise_variance: f32) -> f32 {
-    let mut needed: Vec<f32> = class
+/// square of the factor that just reaches it, and of these the 95th percentile; then the mean of that
+/// and of the usual one, each weighted by how sure it is. Of residuals that are nearly all noise, the
+/// percentile tells nothing.
+fn factor_of(class: &[&Prediction], noise: &BinNoise) -> f32 {
+    let all: Vec<Residual> = residuals(class.iter().copied(), noise).collect();
+    let mut squares: Vec<f32> = all
         .iter()
-        .flat_map(|(_, p)| {
-            (0..3).filter_map(|c| {
-                let beyond_noise =
-                    (p.residual(c)? / Z95).powi(2) - noise_variance / p.bin.count as f32;
-                Some((beyond_noise.max(0.0) / p.variance[c].max(1e-12)).sqrt())
-            })
-        })
+        .map(|r| (r.limit - r.noise) / r.variance)
         .collect();
-    needed.sort_by(f32::total_cmp);
-    let rank = (0.95 * needed.len() as f32) as usize;
-    needed
-        .get(rank.min(needed.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(1.0)
+    let usual = USUAL_FACTOR * USUAL_FACTOR;
+    let Some(square) = percentile_95(&mut squares) else {
+        return USUAL_FACTOR;
+    };
+    let sum = |of: fn(&Residual) -> f32| all.iter().map(of).sum::<f32>();
+    let noise_share = sum(|r| r.noise) / (sum(|r| r.variance) * square.max(usual));
+    // The channels of a bin share their error: they count as one.
+    let by_chance = PERCENTILE_SPREAD * (1.0 + noise_share) / (class.len() as f32).sqrt();
+    let by_noise = NOISE_SPREAD * noise_share;
+    let doubt = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
+    let weight = 1.0 / (1.0 + doubt);
+    (weight * square.max(0.0) + (1.0 - weight) * usual).sqrt()
+}
+
+fn percentile_95(values: &mut [f32]) -> Option<f32> {
+    let rank = (0.95 * values.len() as f32) as usize;
+    let rank = rank.min(values.len().checked_sub(1)?);
+    Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 fn size(variance: [f32; 3]) -> f32 {
@@ -230,7 +326,7 @@ fn mean(log: [f32; 3]) -> f32 {
 
 /// Which cells are beyond all that was measured: beyond the pairs of elevations (for each elevation of
 /// one direction, the highest of the other), or in a gap of the directions.
-pub(super) struct Reach {
+struct Reach {
     n_phi: usize,
     /// By row of the grid: one more than the highest row measured with this row or a higher one.
     rows: Vec<usize>,
@@ -243,7 +339,7 @@ pub(super) struct Reach {
 const GAP_DEG: f64 = 15.0;
 
 impl Reach {
-    pub(super) fn new(bins: &Bins) -> Self {
+    fn new(bins: &Bins) -> Self {
         let grid = bins.grid();
         let n_phi = grid.n_phi();
         let mut rows = vec![0; grid.n_theta()];
@@ -263,7 +359,7 @@ impl Reach {
         Self { n_phi, rows, near }
     }
 
-    pub(super) fn origin(&self, light: usize, view: usize) -> Origin {
+    fn origin(&self, light: usize, view: usize) -> Origin {
         let [lights, views] = &self.near;
         let no_gap = lights[light] && views[view] || lights[view] && views[light];
         if no_gap && view / self.n_phi < self.rows[light / self.n_phi] {
@@ -291,27 +387,23 @@ fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
         .collect()
 }
 
-/// Writes the cells with samples, and their mirrors, over what the blocks gave.
-pub(super) fn write_measured(
-    bars: &mut ErrorBars,
-    bins: &Bins,
-    calibration: &Calibration,
-    values: &[Vec<f32>; 3],
-) {
-    let grid: Grid = bins.grid();
-    for (origin, mirrored) in [(Origin::Reciprocal, true), (Origin::Measured, false)] {
-        for bin in bins.bins() {
-            let (light, view) = grid.light_and_view(bin.cell as usize);
-            let cell = if mirrored {
-                grid.cell(view, light)
-            } else {
-                bin.cell as usize
-            };
-            bars.origin[cell] = origin as u8;
-            let error = calibration.of_measured(bin);
-            for c in 0..3 {
-                bars.standard_error[c][cell] = error[c] * values[c][cell];
-            }
-        }
+/// Where each cell's value comes from, as an [`Origin`] a cell.
+pub fn origins(bins: &Bins) -> Vec<u8> {
+    let grid = bins.grid();
+    let (reach, n) = (Reach::new(bins), grid.n_directions());
+    let mut origins: Vec<u8> = (0..n)
+        .into_par_iter()
+        .flat_map_iter(|light| {
+            let reach = &reach;
+            (0..n).map(move |view| reach.origin(light, view) as u8)
+        })
+        .collect();
+    for bin in bins.bins() {
+        let (light, view) = grid.light_and_view(bin.cell as usize);
+        origins[grid.cell(view, light)] = Origin::Reciprocal as u8;
     }
+    for bin in bins.bins() {
+        origins[bin.cell as usize] = Origin::Measured as u8;
+    }
+    origins
 }

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::blend::{Corners, Shifts};
-use super::error_bars::{Calibration, ErrorBars, Reach, write_measured};
+use super::error_bars::{Calibration, ErrorBars, origins};
 use super::known::Known;
 use super::levels::Levels;
 use super::patches::{Cover, Patch, cover};
@@ -46,19 +46,10 @@ pub fn fill_with_errors(
     let bins = known.bins();
     let grid = bins.grid();
     let (values, standard_error) = solve(known, settings, Some(calibration), progress)?;
-    let reach = Reach::new(bins);
-    let origin = (0..grid.n_directions())
-        .into_par_iter()
-        .flat_map_iter(|light| {
-            let reach = &reach;
-            (0..grid.n_directions()).map(move |view| reach.origin(light, view) as u8)
-        })
-        .collect();
-    let mut bars = ErrorBars {
+    let bars = ErrorBars {
         standard_error,
-        origin,
+        origin: origins(bins),
     };
-    write_measured(&mut bars, bins, calibration, &values);
     Ok((DenseBrdf::from_planes(grid, values), bars))
 }
 

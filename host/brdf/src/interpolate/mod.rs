@@ -24,7 +24,7 @@ pub mod select;
 
 pub use by_rows::ByRows;
 pub use coordinates::Coordinates;
-pub use error_bars::{Calibration, ErrorBars, Origin};
+pub use error_bars::{Calibration, ErrorBars, Origin, origins};
 pub use fill::{FillError, fill, fill_with_errors};
 pub use known::Known;
 pub use select::{Selection, Trial, select};

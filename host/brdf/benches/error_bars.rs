@@ -1,0 +1,134 @@
+//! How many held-out bins, and how many true values, lie within their 95 % intervals.
+//!
+//! `cargo bench -p gonia-brdf --bench error_bars -- [MATERIAL …] [--sparse]`: the paper's plan on the
+//! 2° grid, or every tenth of its frames on 4°.
+
+#![allow(clippy::expect_used)]
+
+mod plan;
+
+use gonia_brdf::direction::Vec3;
+use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::patches::cover;
+use gonia_brdf::interpolate::refine::Refiner;
+use gonia_brdf::interpolate::{Calibration, Known, Origin, Settings, origins, select};
+use gonia_brdf::{Bins, Brdf, Grid};
+use plan::{MATERIALS, cpu_seconds, material, measure};
+
+/// One frame in so many of a sparse plan.
+const SPARSE: u32 = 10;
+/// Pairs of patches whose cells are looked at.
+const PAIRS: usize = 1000;
+/// Cells of each, about.
+const CELLS: usize = 40;
+/// Views end at this elevation, degrees.
+const GRAZING_DEG: f64 = 75.0;
+
+/// Shares of what lies within, in the interior and at grazing angles: how much of how much.
+#[derive(Default)]
+struct Shares([[f64; 2]; 2]);
+
+impl Shares {
+    fn add(&mut self, light: Vec3, view: Vec3, weight: f64, is_within: bool) {
+        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cos();
+        let [within, all] = &mut self.0[usize::from(grazing)];
+        *within += weight * f64::from(u8::from(is_within));
+        *all += weight;
+    }
+}
+
+impl std::fmt::Display for Shares {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [interior, grazing] = self.0.map(|[within, all]| 100.0 * within / all);
+        write!(f, "{:>14}", format!("{interior:.1} ({grazing:.1})"))
+    }
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let sparse = arguments.iter().any(|a| a == "--sparse");
+    let asked = |name: &&str| arguments.iter().any(|a| a == name);
+    let mut names: Vec<&str> = MATERIALS.into_iter().filter(asked).collect();
+    if names.is_empty() {
+        names = MATERIALS.to_vec();
+    }
+    println!("percent within the 95 % interval, interior (grazing)");
+    println!("material       held out  interpolated      measured  calibration, CPU-s");
+    for name in names {
+        let model = material(name);
+        let mut samples = measure(&*model);
+        let mut grid = Grid::PAPER;
+        if sparse {
+            samples.retain(|s| s.frame.is_multiple_of(SPARSE));
+            grid = Grid::with_step_deg(4.0).expect("a grid step");
+        }
+        let bins = Bins::new(grid, &samples);
+        drop(samples);
+        let known = Known::new(&bins);
+        let settings = select(&known, Settings::DEFAULT).settings;
+        let cpu = cpu_seconds();
+        let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
+        let cpu = cpu_seconds() - cpu;
+        let held_out = held_out(&known, &settings, &calibration);
+        let [interpolated, measured] = truths(&known, &settings, &calibration, &*model);
+        println!("{name:<9}{held_out}{interpolated}{measured} {cpu:>10.1}");
+    }
+}
+
+/// Bins of other frames than those that the calibration held out.
+fn held_out(known: &Known, settings: &Settings, calibration: &Calibration) -> Shares {
+    let mut shares = Shares::default();
+    for set in 0..HoldOut::sets(known.bins()) {
+        let held_out = HoldOut::new(known, set, 24, 6000).expect("frames to hold out");
+        for p in held_out.predict(settings) {
+            let (light, view) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
+            for is_within in calibration.covers(&p) {
+                shares.add(light, view, p.weight.into(), is_within);
+            }
+        }
+    }
+    shares
+}
+
+/// True values at cells of pairs of patches without a pattern: interpolated ones, and measured ones
+/// with their mirrors.
+fn truths(
+    known: &Known,
+    settings: &Settings,
+    calibration: &Calibration,
+    model: &dyn Brdf,
+) -> [Shares; 2] {
+    let grid = known.bins().grid();
+    let origins = origins(known.bins());
+    let moved = known.moved(settings.coordinates);
+    let levels = moved.as_ref().unwrap_or(known.levels());
+    let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
+    let mut refiner = Refiner::default();
+    refiner.with_variances = true;
+    let mut shares = [(); 2].map(|()| Shares::default());
+    for k in 0..PAIRS {
+        let (p, q) = (k * 7919 % patches.len(), k * 104_729 % patches.len());
+        let (p, q) = (&patches[p], &patches[q]);
+        refiner.solve(levels, settings, p, q);
+        let (rows, columns) = (p.vectors.len(), q.vectors.len());
+        // Around the pole a pair has thousands of cells, with one error.
+        for k in (0..rows * columns).step_by((rows * columns / CELLS).max(1)) {
+            let (a, b) = (k / columns, k % columns);
+            let (light, view) = (p.vectors[a], q.vectors[b]);
+            let cell = grid.cell(p.directions[a] as usize, q.directions[b] as usize);
+            if origins[cell] == Origin::Extrapolated as u8 {
+                continue;
+            }
+            let log = refiner.logs()[k];
+            let error = calibration.standard_error(light, view, log, refiner.variances()[k]);
+            let truth = model.eval(light, view);
+            let measured = origins[cell] <= Origin::Reciprocal as u8;
+            for c in 0..3 {
+                let off = (f64::from(log[c]) - truth[c].ln()).abs();
+                let is_within = off <= 1.96 * f64::from(error[c]);
+                shares[usize::from(measured)].add(light, view, 1.0, is_within);
+            }
+        }
+    }
+    shares
+}

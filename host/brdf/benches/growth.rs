@@ -1,0 +1,110 @@
+//! Time and memory of binning and filling, against the number of samples, threads, and the grid's step.
+//!
+//! `cargo bench -p gonia-brdf --bench growth` runs each row in a process of its own, which tells its
+//! peak of memory from when the samples are there; `-- --fine` adds the grid of 1°, row by row and
+//! without writing it (a quarter of a CPU-hour).
+
+#![allow(clippy::expect_used)]
+
+mod plan;
+
+use gonia_brdf::interpolate::{ByRows, Known, Settings, fill, select};
+use gonia_brdf::{Bins, Grid};
+use plan::{cpu_seconds, material, measure};
+use std::process::Command;
+use std::time::Instant;
+
+/// Samples (at most), threads, and step of the grid in degrees.
+type Row = (usize, usize, f64);
+
+const ALL: usize = usize::MAX;
+const ROWS: [Row; 6] = [
+    (10_000, 2, 2.0),
+    (100_000, 2, 2.0),
+    (1_000_000, 2, 2.0),
+    (ALL, 2, 2.0),
+    (ALL, 1, 2.0),
+    (ALL, 2, 4.0),
+];
+const FINE: Row = (ALL, 2, 1.0);
+/// A grid of more cells than this is filled row by row, as `gonia fill` does.
+const CELLS_IN_MEMORY: usize = 150_000_000;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(k) = arguments.iter().position(|a| a == "--row") {
+        let number = |by: usize| arguments[k + by].parse::<f64>().expect("a number");
+        return measure_row(number(1) as usize, number(2));
+    }
+    println!(
+        "  samples     bins  step  threads  binning  sorting, choosing   fill  all, CPU-s  wall, s  peak MB"
+    );
+    let fine = arguments.iter().any(|a| a == "--fine").then_some(FINE);
+    for (samples, threads, step) in ROWS.into_iter().chain(fine) {
+        let program = std::env::current_exe().expect("this program");
+        let status = Command::new(program)
+            .args(["--row", &samples.to_string(), &step.to_string()])
+            .env("RAYON_NUM_THREADS", threads.to_string())
+            .status();
+        assert!(status.expect("this program again").success());
+    }
+}
+
+fn measure_row(samples: usize, step: f64) {
+    let grid = Grid::with_step_deg(step).expect("a grid step");
+    let mut all = measure(&*material("fabric"));
+    // Thinned evenly: all frames, with fewer points each.
+    let every = all.len().div_ceil(samples);
+    let mut number = 0;
+    all.retain(|_| {
+        number += 1;
+        number % every == 1 % every
+    });
+    all.shrink_to_fit();
+    let count = all.len();
+    // From here on the peak counts anew.
+    std::fs::write("/proc/self/clear_refs", "5").expect("Linux");
+    let (start, mut last) = (Instant::now(), cpu_seconds());
+    let first = last;
+    let mut lap = || {
+        let now = cpu_seconds();
+        now - std::mem::replace(&mut last, now)
+    };
+    let bins = Bins::new(grid, &all);
+    drop(all);
+    let binning = lap();
+    let known = Known::new(&bins);
+    let settings = Settings {
+        block_deg: Settings::DEFAULT.block_deg.max(2.0 * step),
+        ..Settings::DEFAULT
+    };
+    let settings = select(&known, settings).settings;
+    let choosing = lap();
+    if grid.n_cells() > CELLS_IN_MEMORY {
+        let rows = ByRows::new(&known, &settings, &|_| ()).expect("enough bins");
+        rows.each_row(&|_| (), &|_, row| match row[0][0] {
+            value if value > 0.0 => Ok(()),
+            value => Err(value),
+        })
+        .expect("positive values");
+    } else {
+        drop(fill(&known, &settings, &|_| ()).expect("enough bins"));
+    }
+    let filling = lap();
+    println!(
+        "{count:>9} {:>8} {step:>4}° {:>8} {binning:>8.1} {choosing:>18.1} {filling:>6.1} {:>11.1} {:>8.1} {:>8.0}",
+        bins.bins().len(),
+        rayon::current_num_threads(),
+        cpu_seconds() - first,
+        start.elapsed().as_secs_f64(),
+        peak_mb(),
+    );
+}
+
+/// The most memory that was resident, MB.
+fn peak_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+    kib.map_or(f64::NAN, |kib| kib * 1.024e-3)
+}
