@@ -4,7 +4,7 @@ use gonia_brdf::direction::{Vec3, local_direction};
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate::hold_out::HoldOut;
 use gonia_brdf::interpolate::levels::Levels;
-use gonia_brdf::interpolate::nodes::nodes_of;
+use gonia_brdf::interpolate::nodes::half_of_nodes;
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
@@ -276,7 +276,7 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
-        let levels = Levels::new(nodes_of(bins.bins(), settings.coordinates));
+        let levels = Levels::with_mirror_images(half_of_nodes(bins.bins(), settings.coordinates));
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let around = |d: Vec3| {
             let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
@@ -394,7 +394,7 @@ fn on_a_sparse_plan_cutting_stays_within_its_budget() {
     };
     // What the plan asks for, and a half of it.
     let blocks_cut = |settings: &Settings| {
-        let levels = Levels::new(nodes_of(bins.bins(), settings.coordinates));
+        let levels = Levels::with_mirror_images(half_of_nodes(bins.bins(), settings.coordinates));
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let mut refiner = Refiner::default();
         let mut blocks = 0;

@@ -6,6 +6,7 @@
 //! That makes the blocks agree at the corners, and leaves between them only what of their difference
 //! is not linear along a border.
 
+use super::from_corners::{FromCorners, weights_of};
 use super::patches::{Cover, Patch};
 use crate::bins::median;
 use rayon::prelude::*;
@@ -17,6 +18,8 @@ pub struct Corners {
     /// For each patch, the values of its pairs with itself and all later patches: corner by corner of
     /// the first, corner by corner of the second.
     values: Vec<Vec<[f32; 3]>>,
+    /// Of the same pairs, whether their cells follow from their corners.
+    smooth: Vec<Vec<bool>>,
     /// Means by pair of corners (v, w), v ≤ w: row v begins at `v n − v (v + 1) / 2`.
     means: Vec<[f32; 3]>,
     /// Number of corners.
@@ -27,8 +30,9 @@ pub struct Corners {
 
 impl Corners {
     /// Averages. `values`: for each patch, what its pairs with itself and all later ones give at
-    /// their corners.
-    pub fn new(cover: &Cover, values: Vec<Vec<[f32; 3]>>, least_limit: f32) -> Self {
+    /// their corners, and whether their cells follow from these.
+    pub fn new(cover: &Cover, values: Vec<(Vec<[f32; 3]>, Vec<bool>)>, least_limit: f32) -> Self {
+        let (values, smooth) = values.into_iter().unzip();
         let mut starts = vec![0];
         for (k, patch) in cover.patches.iter().enumerate() {
             starts.push(starts[k] + patch.corners.len());
@@ -37,6 +41,7 @@ impl Corners {
         let mut corners = Self {
             starts,
             values,
+            smooth,
             means: Vec::new(),
             n,
             limit: 0.0,
@@ -116,15 +121,22 @@ impl Corners {
         self.means[v * self.n - v * (v + 1) / 2 + w]
     }
 
-    /// Shifts the cells of patches number `p` ≤ `q`, light by light, towards the means.
+    /// Whether the cells of patches number `p` ≤ `q` follow from their corners.
+    pub fn is_smooth(&self, p: usize, q: usize) -> bool {
+        self.smooth[p][q - p]
+    }
+
+    /// Shifts the cells of patches number `p` ≤ `q`, light by light, towards the means; those of a smooth
+    /// pair are written.
     pub fn blend(
         &self,
         cover: &Cover,
         (p, q): (usize, usize),
-        logs: &mut [[f32; 3]],
+        logs: &mut Vec<[f32; 3]>,
         shifts: &mut Shifts,
     ) {
         let own = self.of_pair(p, q);
+        let smooth = self.is_smooth(p, q);
         let (p, q) = (&cover.patches[p], &cover.patches[q]);
         shifts.clear();
         for (i, v) in p.corners.iter().enumerate() {
@@ -133,7 +145,19 @@ impl Corners {
                 shifts.push(own, self.mean(*v, *w), self.limit);
             }
         }
-        shifts.apply(p, q, logs);
+        match weights_of(p, q) {
+            Some(weights) if smooth => {
+                for (shift, own) in shifts.at_corners.iter_mut().zip(own) {
+                    *shift = [0, 1, 2].map(|c| own[c] + shift[c]);
+                }
+                let cells = (p.directions.len(), q.directions.len());
+                shifts
+                    .from_corners
+                    .load(&shifts.at_corners, q.corners.len());
+                shifts.from_corners.write(weights, cells, logs);
+            }
+            _ => shifts.apply(p, q, logs),
+        }
     }
 }
 
@@ -158,6 +182,7 @@ pub struct Shifts {
     /// At pairs of corners, corner by corner of the first patch.
     at_corners: Vec<[f32; 3]>,
     row: Vec<[f32; 3]>,
+    from_corners: FromCorners,
 }
 
 impl Shifts {

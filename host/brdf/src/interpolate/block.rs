@@ -227,7 +227,11 @@ impl BlockSolver {
     /// sum of the correlations of all pairs.
     #[inline(always)]
     fn fill_matrix<S: Simd>(&mut self, simd: S, n: usize, padded: usize) -> f32 {
-        let mut total = 0.0f32;
+        // The matrix is symmetric: the squares on its diagonal hold each pair twice, and each node with
+        // itself.
+        let mut below = simd.splat_f32s(0.0);
+        let mut square = simd.splat_f32s(0.0);
+        let mut surplus = 0.0f32;
         for j in 0..n {
             let mut place = Place::<S>::at_origin(simd);
             for k in 0..6 {
@@ -237,28 +241,27 @@ impl BlockSolver {
             let column = self.matrix.column_mut(j);
             let (target, _) = S::as_mut_simd_f32s(&mut column[first..padded]);
             let axes = vectors::<S>(&self.axes, &self.norms, first..padded);
-            let mut sum = simd.splat_f32s(0.0);
             let mut r = 0;
             while r + CHAINS <= target.len() {
                 let k = kernel::<S, CHAINS>(simd, &place, &axes, r);
                 for g in 0..CHAINS {
                     target[r + g] = k[g];
-                    sum = simd.add_f32s(sum, k[g]);
+                    below = simd.add_f32s(below, k[g]);
                 }
                 r += CHAINS;
             }
             while r < target.len() {
                 let [k] = kernel::<S, 1>(simd, &place, &axes, r);
                 target[r] = k;
-                sum = simd.add_f32s(sum, k);
+                below = simd.add_f32s(below, k);
                 r += 1;
             }
-            // What the whole vectors hold too much: rows up to the diagonal, and the padding.
-            let mut surplus = 0.0;
-            for row in (first..=j).chain(n..padded) {
-                surplus += column[row];
+            square = simd.add_f32s(square, target[0]);
+            // What whole vectors hold of the padding; half of it in the last square.
+            for row in n..padded {
+                let share = if row < first + S::F32_LANES { 0.5 } else { 1.0 };
+                surplus += share * column[row];
             }
-            total += simd.reduce_sum_f32s(sum) - surplus;
             column[n..].fill(0.0);
             for c in 0..3 {
                 column[padded + c] = self.log_values[c][j];
@@ -270,7 +273,8 @@ impl BlockSolver {
             column.fill(0.0);
             column[j] = 1.0;
         }
-        total
+        let squares = simd.reduce_sum_f32s(square) + n as f32;
+        simd.reduce_sum_f32s(below) - 0.5 * squares - surplus
     }
 
     /// Variance of the nodes' values, mean over the channels, and the share of it that is noise.
@@ -315,24 +319,41 @@ impl BlockSolver {
         for c in 0..3 {
             self.signal[c] = squares[c] / n as f32;
         }
-        for j in (0..n).rev() {
-            let column = self.matrix.column(j);
-            // Weights of rows up to j are still zero, so a whole vector may hold them; what stands
-            // above the diagonal of L is zero but for rounding.
-            let first = (j + 1) / S::F32_LANES * S::F32_LANES;
-            let (l, _) = S::as_simd_f32s(&column[first..padded]);
-            let mut dots = [simd.splat_f32s(0.0); 3];
-            for c in 0..3 {
-                let (w, _) = S::as_simd_f32s(&self.weights[c][first..padded]);
-                for (a, b) in l.iter().zip(w) {
-                    dots[c] = simd.mul_add_e_f32s(*a, *b, dots[c]);
+        // Some columns at a time: first what the rows below take from them, which none of them waits for, then
+        // the small triangle that is left.
+        let lanes = S::F32_LANES;
+        for from in (0..n).step_by(lanes).rev() {
+            let to = (from + lanes).min(n);
+            let mut left = [[0.0f32; 3]; PAD];
+            for j in from..to {
+                let column = self.matrix.column(j);
+                let below = (from + lanes).min(padded);
+                let (l, _) = S::as_simd_f32s(&column[below..padded]);
+                let mut dots = [simd.splat_f32s(0.0); 3];
+                for c in 0..3 {
+                    let (w, _) = S::as_simd_f32s(&self.weights[c][below..padded]);
+                    for (a, b) in l.iter().zip(w) {
+                        dots[c] = simd.mul_add_e_f32s(*a, *b, dots[c]);
+                    }
+                }
+                let z = &column[padded..padded + RHS];
+                for c in 0..3 {
+                    let dot = simd.reduce_sum_f32s(dots[c]);
+                    left[j - from][c] = z[c] - self.mean[c] * z[3] - dot;
                 }
             }
-            let z = &column[padded..padded + RHS];
-            let inverse = 1.0 / column[j];
-            for c in 0..3 {
-                let dot = simd.reduce_sum_f32s(dots[c]);
-                self.weights[c][j] = (z[c] - self.mean[c] * z[3] - dot) * inverse;
+            for j in (from..to).rev() {
+                let inverse = 1.0 / self.matrix.column(j)[j];
+                let weights = left[j - from].map(|x| x * inverse);
+                for c in 0..3 {
+                    self.weights[c][j] = weights[c];
+                }
+                for i in from..j {
+                    let l = self.matrix.column(i)[j];
+                    for c in 0..3 {
+                        left[i - from][c] -= l * weights[c];
+                    }
+                }
             }
         }
     }

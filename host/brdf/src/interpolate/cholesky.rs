@@ -23,11 +23,13 @@ impl Columns {
     }
 
     /// Column `j`.
+    #[inline(always)]
     pub fn column(&self, j: usize) -> &[f32] {
         &self.data[j * self.rows..(j + 1) * self.rows]
     }
 
     /// Column `j`, to be written.
+    #[inline(always)]
     pub fn column_mut(&mut self, j: usize) -> &mut [f32] {
         &mut self.data[j * self.rows..(j + 1) * self.rows]
     }
@@ -55,14 +57,20 @@ impl Columns {
 #[inline(always)]
 fn update<S: Simd>(simd: S, done: &[f32], panel: &mut [f32], rows: usize, j: usize, first: usize) {
     let lanes = S::F32_LANES;
+    // Of 32 registers (vectors of 16) four strips of four columns take 16; of 16, three take 12.
+    let most = if lanes >= 16 { 4 } else { 3 };
     let mut row = first;
-    while row + 3 * lanes <= rows {
-        update_strip::<S, 3>(simd, done, panel, rows, j, row);
-        row += 3 * lanes;
-    }
     while row < rows {
-        update_strip::<S, 1>(simd, done, panel, rows, j, row);
-        row += lanes;
+        // Strips of even heights: one alone would wait for each of its products.
+        let left = (rows - row) / lanes;
+        let strips = left.div_ceil(left.div_ceil(most));
+        match strips {
+            4 => update_strip::<S, 4>(simd, done, panel, rows, j, row),
+            3 => update_strip::<S, 3>(simd, done, panel, rows, j, row),
+            2 => update_strip::<S, 2>(simd, done, panel, rows, j, row),
+            _ => update_strip::<S, 1>(simd, done, panel, rows, j, row),
+        }
+        row += strips * lanes;
     }
 }
 

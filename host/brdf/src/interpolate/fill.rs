@@ -69,7 +69,9 @@ fn solve(
     // First the logarithms of the cells of each pair, and their relative errors.
     let corners = fit.solve_pairs(calibration.is_some(), progress, &|refiner, p, q| {
         let logs = refiner.logs();
-        values.store(grid, (p, q), logs);
+        if !refiner.is_smooth() {
+            values.store(grid, (p, q), logs);
+        }
         if let Some(calibration) = calibration {
             let variances = refiner.variances();
             let directions = p
@@ -92,7 +94,9 @@ fn solve(
         .for_each_init(Blended::default, |work, p| {
             for q in p..patches.len() {
                 let pair = (&patches[p], &patches[q]);
-                values.load(grid, pair, &mut work.logs);
+                if !corners.is_smooth(p, q) {
+                    values.load(grid, pair, &mut work.logs);
+                }
                 corners.blend(&fit.cover, (p, q), &mut work.logs, &mut work.shifts);
                 for log in &mut work.logs {
                     *log = log.map(bounded_exp);
@@ -156,15 +160,16 @@ impl<'a> Fit<'a> {
             .with_max_len(1)
             .map_init(Refiner::default, |refiner, p| {
                 refiner.with_variances = with_variances;
-                let mut at_corners = Vec::new();
+                let (mut at_corners, mut smooth) = (Vec::new(), Vec::new());
                 for q in &patches[p..] {
                     refiner.solve(self.levels(), self.settings, &patches[p], q);
                     at_corners.extend_from_slice(refiner.corners());
+                    smooth.push(refiner.is_smooth());
                     each(refiner, &patches[p], q);
                 }
                 let before = done.fetch_add(patches.len() - p, Relaxed);
                 progress((before + patches.len() - p) as f64 / pairs as f64);
-                at_corners
+                (at_corners, smooth)
             })
             .collect();
         Corners::new(&self.cover, at_corners, self.settings.blend_limit())

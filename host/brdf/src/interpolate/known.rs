@@ -2,10 +2,9 @@
 
 use super::coordinates::{Coordinates, Point, distance2};
 use super::levels::{Detail, Found, Levels, Neighbours};
-use super::nodes::{Node, merge, nodes_of};
+use super::nodes::{Node, half_of_nodes, merge};
 use crate::bins::Bins;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use rayon::prelude::*;
 use std::num::NonZero;
 
 /// The coordinates that many nodes are sorted in. What is near in one system is near in another, so that
@@ -32,7 +31,7 @@ impl<'a> Known<'a> {
     fn sorted_in(bins: &'a Bins, coordinates: Coordinates) -> Self {
         Self {
             bins,
-            levels: Levels::new(nodes_of(bins.bins(), coordinates)),
+            levels: Levels::with_mirror_images(half_of_nodes(bins.bins(), coordinates)),
             coordinates,
         }
     }
@@ -65,14 +64,10 @@ impl<'a> Known<'a> {
     /// The nodes of those bins that `keep` keeps (by their number), in some coordinates. Nothing is
     /// copied: this is for a few thousand places, where [`Self::moved`] is for all.
     pub fn part<K: Fn(usize) -> bool>(&self, coordinates: Coordinates, keep: K) -> Part<'_, K> {
-        let place = |node: &Node| self.coordinates.convert(&node.point, coordinates);
-        let middles: Vec<Point> = (0..self.levels.groups())
-            .into_par_iter()
-            .filter_map(|group| {
-                let nodes = self.levels.bins_of_group(group).iter();
-                merge(nodes.map(|node| (place(node), node)))
-            })
-            .map(|node| node.point)
+        // Groups are found by their middles, which need not be exact.
+        let middles = self.levels.middles().iter();
+        let middles: Vec<Point> = middles
+            .map(|middle| self.coordinates.convert(middle, coordinates))
             .collect();
         Part {
             levels: &self.levels,
@@ -98,6 +93,12 @@ impl<K: Fn(usize) -> bool> Part<'_, K> {
         self.sorted_in.convert(&node.point, self.coordinates)
     }
 
+    /// Whether a bin of a merged node is not left out.
+    fn is_kept(&self, number: usize) -> bool {
+        let mut nodes = self.levels.bins()[self.levels.bins_of(number)].iter();
+        nodes.any(|node| (self.keep)(node.bin()))
+    }
+
     /// A merged node without the bins that are left out; `None` when none are left.
     fn merged(&self, number: usize) -> Option<Node> {
         let nodes = self.levels.bins()[self.levels.bins_of(number)].iter();
@@ -115,8 +116,10 @@ impl<K: Fn(usize) -> bool> Neighbours for Part<'_, K> {
         let query = tree.query(place);
         for group in query.nearest_n::<SquaredEuclidean<f32>>(groups).execute() {
             for number in self.levels.group(group.item as usize) {
-                if let Some(node) = self.merged(number) {
-                    found.push((distance2(place, &node.point), number as u32));
+                // Near enough for ranking is where the node would be with all of its bins.
+                if self.is_kept(number) {
+                    let node = &self.levels.nodes(Detail::Merged)[number];
+                    found.push((distance2(place, &self.place(node)), number as u32));
                 }
             }
         }

@@ -39,6 +39,10 @@ pub struct Levels {
     merged: Vec<Node>,
     /// Where the bins of each merged node start, and the end of the last.
     starts: Vec<u32>,
+    /// Whether the second half of the nodes are the mirror images of the first, in their order.
+    mirrored: bool,
+    /// Middles of the groups of merged nodes.
+    middles: Vec<Point>,
     tree: Option<ImmutableKdTree<f32, 6>>,
 }
 
@@ -60,14 +64,22 @@ pub trait Neighbours {
 
 impl Levels {
     /// Sorts and merges the nodes.
-    pub fn new(mut bins: Vec<Node>) -> Self {
-        let depth = (bins.len() / MERGE).max(1).ilog2();
-        split(&mut bins, depth);
-        let mut starts = Vec::with_capacity((1 << depth) + 1);
-        push_starts(0, bins.len(), depth, &mut starts);
-        starts.push(bins.len() as u32);
-        doubt_outliers(&mut bins, &starts);
-        Self::sorted(bins, starts)
+    pub fn new(nodes: Vec<Node>) -> Self {
+        let (bins, starts) = in_order(nodes);
+        Self::sorted(bins, starts, false)
+    }
+
+    /// The same of `half` of the nodes, and the mirror images of all these: half the work. No mirror image
+    /// of a node is to be in the half itself.
+    pub fn with_mirror_images(half: Vec<Node>) -> Self {
+        let (mut bins, mut starts) = in_order(half);
+        let n = bins.len();
+        append_mirror_images(&mut bins);
+        starts.pop();
+        let images: Vec<u32> = starts.iter().map(|start| start + n as u32).collect();
+        starts.extend(images);
+        starts.push(2 * n as u32);
+        Self::sorted(bins, starts, true)
     }
 
     /// The same nodes at other places. What is near in one system of coordinates is near in
@@ -81,14 +93,22 @@ impl Levels {
                 ..*node
             })
             .collect();
-        Self::sorted(bins, self.starts.clone())
+        Self::sorted(bins, self.starts.clone(), self.mirrored)
     }
 
-    fn sorted(bins: Vec<Node>, starts: Vec<u32>) -> Self {
-        let merged: Vec<Node> = starts
+    fn sorted(bins: Vec<Node>, starts: Vec<u32>, mirrored: bool) -> Self {
+        let merging = if mirrored {
+            starts.len() / 2
+        } else {
+            starts.len() - 1
+        };
+        let mut merged: Vec<Node> = starts[..=merging]
             .par_windows(2)
             .filter_map(|w| merge(here(&bins[w[0] as usize..w[1] as usize])))
             .collect();
+        if mirrored {
+            append_mirror_images(&mut merged);
+        }
         let middles: Vec<Point> = merged
             .chunks(GROUP)
             .filter_map(|nodes| merge(here(nodes)))
@@ -99,6 +119,8 @@ impl Levels {
             bins,
             merged,
             starts,
+            mirrored,
+            middles,
             tree,
         }
     }
@@ -121,21 +143,15 @@ impl Levels {
         self.starts[merged] as usize..self.starts[merged + 1] as usize
     }
 
-    /// Number of groups of merged nodes.
-    pub(super) fn groups(&self) -> usize {
-        self.merged.len().div_ceil(GROUP)
+    /// Middles of the groups of merged nodes.
+    pub(super) fn middles(&self) -> &[Point] {
+        &self.middles
     }
 
     /// The numbers of the merged nodes in a group.
     pub(super) fn group(&self, number: usize) -> Range<usize> {
         let start = number * GROUP;
         start..(start + GROUP).min(self.merged.len())
-    }
-
-    /// The bins of a group.
-    pub(super) fn bins_of_group(&self, number: usize) -> &[Node] {
-        let merged = self.group(number);
-        &self.bins[self.starts[merged.start] as usize..self.starts[merged.end] as usize]
     }
 
     /// How many groups are looked at for the nearest `n` merged nodes.
@@ -175,6 +191,18 @@ impl Neighbours for Levels {
     }
 }
 
+/// Appends the mirror images of nodes to them.
+fn append_mirror_images(nodes: &mut Vec<Node>) {
+    let n = nodes.len();
+    let Some(any) = nodes.first().copied() else {
+        return;
+    };
+    nodes.resize(2 * n, any);
+    let (half, images) = nodes.split_at_mut(n);
+    let pairs = images.par_iter_mut().zip(half);
+    pairs.for_each(|(image, node)| *image = node.mirrored());
+}
+
 /// Nodes at their own places.
 fn here(nodes: &[Node]) -> impl Iterator<Item = (Point, &Node)> {
     nodes.iter().map(|node| (node.point, node))
@@ -187,6 +215,18 @@ pub fn keep_nearest(found: &mut Vec<Found>, n: usize) -> f32 {
         found.truncate(n);
     }
     found.iter().map(|f| f.0).fold(0.0, f32::max).sqrt()
+}
+
+/// Sorts nodes so that neighbours follow each other. Also where those that are to be merged start, and the
+/// end of the last.
+fn in_order(mut nodes: Vec<Node>) -> (Vec<Node>, Vec<u32>) {
+    let depth = (nodes.len() / MERGE).max(1).ilog2();
+    split(&mut nodes, depth);
+    let mut starts = Vec::with_capacity((1 << depth) + 1);
+    push_starts(0, nodes.len(), depth, &mut starts);
+    starts.push(nodes.len() as u32);
+    doubt_outliers(&mut nodes, &starts);
+    (nodes, starts)
 }
 
 /// Sorts nodes by halving `depth` times along the widest axis.
@@ -335,6 +375,29 @@ mod tests {
             {
                 assert!((got - truth).abs() < 1e-5, "{got} {truth}");
             }
+        }
+    }
+
+    #[test]
+    fn mirror_images_stand_at_their_places_and_share_their_values() {
+        let levels = Levels::with_mirror_images(lattice());
+        for detail in [Detail::Bins, Detail::Merged] {
+            let (half, images) = levels
+                .nodes(detail)
+                .split_at(levels.nodes(detail).len() / 2);
+            assert_eq!(half.len(), images.len());
+            for (node, image) in half.iter().zip(images) {
+                assert_eq!(image.point, node.mirrored().point);
+                assert_eq!(image.log_value, node.log_value);
+            }
+        }
+        let merged = levels.nodes(Detail::Merged).len();
+        assert_eq!(levels.bins_of(merged - 1).end, 8000);
+        // Each bin once in either half: the merged nodes of the second are those of its bins.
+        for k in [0, merged / 2, merged - 1] {
+            let bins = &levels.bins()[levels.bins_of(k)];
+            let count: f32 = bins.iter().map(|n| n.count).sum();
+            assert_eq!(count, levels.nodes(Detail::Merged)[k].count);
         }
     }
 

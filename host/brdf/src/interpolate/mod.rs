@@ -14,6 +14,7 @@ pub mod cholesky;
 pub mod coordinates;
 pub mod error_bars;
 pub mod fill;
+pub mod from_corners;
 pub mod hold_out;
 pub mod known;
 pub mod levels;

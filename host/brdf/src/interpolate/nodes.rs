@@ -24,28 +24,40 @@ impl Node {
     pub fn bin(&self) -> usize {
         (self.source / 2) as usize
     }
+
+    /// The same with light and view exchanged: [`Coordinates`] only flip the sign of the second half.
+    pub fn mirrored(&self) -> Self {
+        let [a, b, c, d, e, f] = self.point;
+        Self {
+            point: [a, b, c, -d, -e, -f],
+            source: self.source ^ 1,
+            ..*self
+        }
+    }
 }
 
 /// A median at or below this share of the material's median brightness is raised to it: noise can
 /// make dark values negative, and their logarithm must stay finite.
 const FLOOR_SHARE: f32 = 1e-4;
 
-/// Nodes of bins, numbered as they come, and of their mirror images (light and view exchanged).
-pub fn nodes_of(bins: &[Bin], coordinates: Coordinates) -> Vec<Node> {
+/// A node of each bin, numbered as they come: the bin's own or its mirror image (light and view exchanged),
+/// whichever's difference of light and view points to positive x. The others are the mirror images of these.
+pub fn half_of_nodes(bins: &[Bin], coordinates: Coordinates) -> Vec<Node> {
     let floor = floor_of(bins.iter());
     bins.par_iter()
         .enumerate()
-        .flat_map_iter(|(number, bin)| {
-            let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
-            let log_value = [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln());
-            [(light, view), (view, light)].into_iter().zip([0, 1]).map(
-                move |((light, view), mirrored)| Node {
-                    point: coordinates.point(light, view),
-                    log_value,
-                    count: bin.count as f32,
-                    source: 2 * number as u32 + mirrored,
-                },
-            )
+        .map(|(number, bin)| {
+            let node = Node {
+                point: coordinates.point(bin.light.map(f64::from), bin.view.map(f64::from)),
+                log_value: [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln()),
+                count: bin.count as f32,
+                source: 2 * number as u32,
+            };
+            if node.point[3] < 0.0 {
+                node.mirrored()
+            } else {
+                node
+            }
         })
         .collect()
 }

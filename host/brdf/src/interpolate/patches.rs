@@ -5,6 +5,7 @@
 //! the corners of both, so that what is linear between the corners of an edge is the same seen from
 //! either side.
 
+use super::from_corners::Weights;
 use crate::direction::{Direction, Vec3, normalize};
 use crate::grid::Grid;
 use std::collections::BTreeMap;
@@ -33,6 +34,9 @@ pub struct Patch {
     pub corner_vectors: Vec<Vec3>,
     /// How each direction lies between corners, by their places in `corners`.
     pub between: Vec<Between>,
+    /// How its cells follow from its corners where a block is smooth; `None` where that gains nothing,
+    /// and in parts.
+    pub weights: Option<Weights>,
     /// Smaller patches of the same directions; none where the patch is of the smallest size.
     pub children: Vec<Child>,
     rows: Range<usize>,
@@ -63,6 +67,7 @@ pub fn cover(grid: Grid, sizes_deg: &[f64]) -> Cover {
     for patch in &mut patches {
         edges.give_corners(grid, patch);
         give_vectors(&corners, patch);
+        patch.weights = Weights::new(&patch.corner_vectors, &patch.vectors, patch.centre);
     }
     Cover { patches, corners }
 }
@@ -129,6 +134,7 @@ fn patch(grid: Grid, rows: Range<usize>, columns: Range<usize>, smaller_deg: &[f
         corners: Vec::new(),
         corner_vectors: Vec::new(),
         between: Vec::new(),
+        weights: None,
         children,
         rows,
         columns,

@@ -10,6 +10,7 @@ use super::Settings;
 use super::blend::{Shifts, difference, limit_of};
 use super::block::BlockSolver;
 use super::coordinates::Point;
+use super::from_corners::{FromCorners, weights_of};
 use super::levels::{Detail, Found, Neighbours, keep_nearest};
 use super::patches::{Child, Patch};
 use crate::direction::{Vec3, dot};
@@ -20,6 +21,10 @@ pub struct Refiner {
     /// The block of the pair, and the one of a part.
     whole: BlockSolver,
     fine: BlockSolver,
+    /// The block that a doubt was settled by, and around what it was fitted: should the pair be cut, it
+    /// serves again.
+    trial: BlockSolver,
+    trial_at: Option<(Vec3, Vec3)>,
     /// Merged nodes whose bins are looked at.
     near: Vec<Found>,
     found: Vec<Found>,
@@ -37,6 +42,9 @@ pub struct Refiner {
     /// What the parts differ from each other by, at their corners.
     differences: Vec<f32>,
     shifts: Shifts,
+    from_corners: FromCorners,
+    /// Whether the cells of the last pair follow from its corners.
+    smooth: bool,
     /// Whether variances are wanted too.
     pub with_variances: bool,
     /// Variances of the logarithms, where wanted.
@@ -71,7 +79,12 @@ impl Refiner {
     pub fn solve(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         self.fit_whole(levels, settings, p, q);
         if self.is_to_be_cut(levels, settings, p, q) {
+            self.smooth = false;
             self.solve_parts(levels, settings, p, q);
+            return;
+        }
+        self.smooth = self.whole_is_smooth(settings, p, q);
+        if self.smooth && !self.with_variances {
             return;
         }
         write_places(settings, p, q, &mut self.places);
@@ -201,12 +214,45 @@ impl Refiner {
         self.fit_part(levels, settings, a.patch.centre, b.patch.centre);
         self.part.clear();
         self.fine.evaluate(&self.places, &mut self.part);
+        std::mem::swap(&mut self.fine, &mut self.trial);
+        self.trial_at = Some((a.patch.centre, b.patch.centre));
         let pairs = self.logs.iter().flatten().zip(self.part.iter().flatten());
         let squares: f32 = pairs.map(|(x, y)| (x - y).powi(2)).sum();
         (squares / (3 * self.part.len()).max(1) as f32).sqrt() / noise
     }
 
-    /// Natural logarithms of the cells of the last pair, light by light.
+    /// Whether the coarse block that was fitted last tells its cells by its corners: at some cells it is
+    /// asked.
+    fn whole_is_smooth(&mut self, settings: &Settings, p: &Patch, q: &Patch) -> bool {
+        let Some(weights) = weights_of(p, q) else {
+            return false;
+        };
+        let (lights, views) = (places_of_some(&p.vectors), places_of_some(&q.vectors));
+        self.places.clear();
+        for light in lights.clone() {
+            for view in views.clone() {
+                let point = settings
+                    .coordinates
+                    .point(p.vectors[light], q.vectors[view]);
+                self.places.push(point);
+            }
+        }
+        self.part.clear();
+        self.whole.evaluate(&self.places, &mut self.part);
+        self.from_corners.load(&self.corners, q.corners.len());
+        let difference = self
+            .from_corners
+            .largest_difference(weights, lights, views, &self.part);
+        difference <= SMOOTH * settings.noise_sigma()
+    }
+
+    /// Whether the last pair needs no cells: they follow from its corners.
+    pub fn is_smooth(&self) -> bool {
+        self.smooth
+    }
+
+    /// Natural logarithms of the cells of the last pair, light by light; none where it
+    /// [is smooth](Self::is_smooth), unless variances are wanted.
     pub fn logs(&self) -> &[[f32; 3]] {
         &self.logs
     }
@@ -259,6 +305,7 @@ impl Refiner {
         let centre = settings.coordinates.point(p.centre, q.centre);
         levels.around(&centre, settings.nodes, &mut self.found);
         self.count.blocks += 1;
+        self.trial_at = None;
         let (found, detail) = (&mut self.found, Detail::Merged);
         fit(&mut self.whole, levels, settings, detail, centre, found);
         write_corners(settings, p, q, &mut self.places);
@@ -278,7 +325,13 @@ impl Refiner {
 
     /// A pair of parts in a fine block: its cells and, appended, its corners.
     fn solve_part(&mut self, levels: &impl Neighbours, settings: &Settings, a: &Child, b: &Child) {
-        self.fit_part(levels, settings, a.patch.centre, b.patch.centre);
+        let at = (a.patch.centre, b.patch.centre);
+        if self.trial_at == Some(at) {
+            std::mem::swap(&mut self.fine, &mut self.trial);
+            self.trial_at = None;
+        } else {
+            self.fit_part(levels, settings, at.0, at.1);
+        }
         write_corners(settings, &a.patch, &b.patch, &mut self.places);
         self.fine.evaluate(&self.places, &mut self.part_corners);
         write_places(settings, &a.patch, &b.patch, &mut self.places);
@@ -327,10 +380,16 @@ fn write_pairs(settings: &Settings, lights: &[Vec3], views: &[Vec3], places: &mu
 
 /// Up to four of some directions, evenly spread.
 fn some_of(directions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
-    directions
-        .iter()
-        .step_by(directions.len().div_ceil(4).max(1))
+    places_of_some(directions).map(|place| &directions[place])
 }
+
+/// Where they stand.
+fn places_of_some(directions: &[Vec3]) -> impl Iterator<Item = usize> + Clone + use<> {
+    (0..directions.len()).step_by(directions.len().div_ceil(4).max(1))
+}
+
+/// Cells may differ from what the corners give by this many standard deviations of a sample.
+const SMOOTH: f32 = 0.15;
 
 /// A coarse block whose own variance is less than this share of what would be tolerated is not doubted:
 /// hardly any of those that must be cut are as sure of themselves, and asking all would cost as much

@@ -11,6 +11,8 @@ use super::patches::cover;
 
 /// Held-out bins that are predicted, at most, over all sets.
 const TESTS: usize = 1200;
+/// Bins that tell the noise, about.
+const NOISE_BINS: usize = 300_000;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
 /// The systems of coordinates that compete; of those that are as good as the best, the first.
@@ -52,7 +54,8 @@ pub struct Selection {
 pub fn select(known: &Known, base: Settings) -> Selection {
     let bins = known.bins();
     let mut settings = base;
-    if let Some(variance) = log_noise_variance(bins.bins().iter()) {
+    let stride = (bins.bins().len() / NOISE_BINS).max(1) | 1;
+    if let Some(variance) = log_noise_variance(bins.bins().iter().step_by(stride)) {
         settings.noise_variance = variance;
     }
     let sets = HoldOut::sets(bins);
