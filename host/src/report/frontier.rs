@@ -2,8 +2,9 @@
 //! front; and error against the number of images.
 
 use super::svg;
-use crate::evaluate::chart::{Family, Point, front};
+use crate::evaluate::chart::{Contender, Family, Point, front};
 use crate::evaluate::{Stratum, StratumFigures};
+use gonia_brdf::interpolate::Preset;
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 
@@ -46,6 +47,7 @@ const STYLE: &str = "\
 svg { background: #fbfaf7; }
 text { font: 11px system-ui, sans-serif; fill: #1d2326; }
 text.small { fill: #5c676b; font-size: 9.5px; }
+text.name { fill: #1d2326; font-size: 9px; paint-order: stroke; stroke: #fbfaf7; stroke-width: 2.5px; }
 text.title { font-weight: 600; }
 .frame { fill: none; stroke: #dcd9d0; }
 .tick { stroke: #e8e5dd; stroke-width: 0.8; }
@@ -85,16 +87,16 @@ pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
                 .collect();
             let worth_a_name =
                 |k: usize, p: &Point| along.contains(&k) || p.is_default || p.name == "paper";
-            let named: Vec<(&Point, &str)> = points
+            let named: Vec<(&Point, String)> = points
                 .iter()
                 .enumerate()
                 .filter(|(k, point)| worth_a_name(*k, point))
-                .map(|(_, point)| (point, point.name.as_str()))
+                .map(|(_, point)| (point, label(&point.name)))
                 .collect();
             html! {
                 polyline class="front" points=(polyline(&line)) {}
                 @for point in points { (chart.dot(point)) }
-                (chart.names(&named))
+                (chart.names(&named, points))
             }
         },
     )
@@ -111,9 +113,9 @@ pub fn images(points: &[Point], title: &str, basis: &str) -> String {
         }
         let last = series.values().filter_map(|points| points.last());
         let central = points.iter().filter(|p| is_central(p));
-        let named: Vec<(&Point, &str)> = last
-            .map(|point| (*point, method_of(point)))
-            .chain(central.map(|point| (point, "central only")))
+        let named: Vec<(&Point, String)> = last
+            .map(|point| (*point, label(method_of(point))))
+            .chain(central.map(|point| (point, "central only".to_owned())))
             .collect();
         html! {
             @for points in series.values() {
@@ -122,9 +124,24 @@ pub fn images(points: &[Point], title: &str, basis: &str) -> String {
                     style="fill:none" points=(polyline(&line)) {}
             }
             @for point in points { (chart.dot(point)) }
-            (chart.names(&named))
+            (chart.names(&named, points))
         }
     })
+}
+
+/// A method's name in few letters: a preset's word, or the size of blocks, their nodes and tolerance.
+fn label(name: &str) -> String {
+    let contender = |preset: &Preset| Contender::Blocks(preset.settings()).to_string();
+    if let Some(preset) = Preset::ALL.iter().find(|preset| contender(preset) == name) {
+        return preset.name().to_owned();
+    }
+    let Some(blocks) = name.strip_prefix("blocks=") else {
+        return name.to_owned();
+    };
+    blocks
+        .replace(",nodes=", "°, ")
+        .replace(",tolerance=", ", t=")
+        .replace(",budget=", ", b=")
 }
 
 fn method_of(point: &Point) -> &str {
@@ -272,34 +289,45 @@ impl Panel {
         }
     }
 
-    /// Names beside their points, away from the panel's nearer side, each as near to its point as
-    /// those before leave room.
-    fn names(&self, named: &[(&Point, &str)]) -> Markup {
+    /// Names beside their points, each as near to its own as other names and points leave room.
+    fn names(&self, named: &[(&Point, String)], points: &[Point]) -> Markup {
         /// Height and mean width of a letter.
-        const LETTER: (f64, f64) = (10.0, 5.0);
-        let mut taken: Vec<(f64, f64, f64)> = Vec::new();
+        const LETTER: (f64, f64) = (10.0, 4.9);
+        // What is taken: left, right, top and bottom.
+        let dots = points.iter().filter_map(|point| self.place(point));
+        let mut taken: Vec<[f64; 4]> = dots
+            .map(|(x, y)| [x - 4.0, x + 4.0, y - 4.0, y + 4.0])
+            .collect();
         let mut texts = Vec::new();
         for (point, name) in named {
             let Some((x, y)) = self.place(point) else {
                 continue;
             };
             let width = LETTER.1 * name.chars().count() as f64;
-            let (anchor, at, left) = if x > 0.55 * W {
-                ("end", x - 5.0, x - 5.0 - width)
-            } else {
-                ("start", x + 5.0, x + 5.0)
+            let overlap = |b: &[f64; 4]| -> f64 {
+                let shared = |a: &[f64; 4]| {
+                    let across = a[1].min(b[1]) - a[0].max(b[0]);
+                    let along = a[3].min(b[3]) - a[2].max(b[2]);
+                    across.max(0.0) * along.max(0.0)
+                };
+                let outside = (b[1] - (W - RIGHT)).max(0.0) + (LEFT - b[0]).max(0.0);
+                let beyond = (b[3] - (H - BOTTOM)).max(0.0) + (TOP - b[2]).max(0.0);
+                taken.iter().map(shared).sum::<f64>() + 100.0 * (outside + beyond)
             };
-            let is_free = |y: &f64| {
-                taken.iter().all(|(other, other_y, other_width)| {
-                    (y - other_y).abs() >= LETTER.0
-                        || left > other + other_width
-                        || *other > left + width
+            let sides = [(8.0, false), (-8.0, true)];
+            let rises = [3.5, -7.0, 14.0, -18.0, 25.0, -29.0, 36.0, -40.0, 47.0];
+            let places = rises.into_iter().flat_map(|dy| {
+                sides.map(|(dx, is_left)| {
+                    let left = if is_left { x + dx - width } else { x + dx };
+                    let bottom = y + dy + 2.0;
+                    [left, left + width, bottom - LETTER.0, bottom]
                 })
-            };
-            let places = [-7.0, 14.0, 25.0, -18.0, 36.0].map(|dy| y + dy);
-            let y = places.into_iter().find(is_free).unwrap_or(places[0]);
-            taken.push((left, y, width));
-            texts.push(svg::text(at, y, anchor, "small", name));
+            });
+            // Of equal ones the first, which is the nearest.
+            let best = places.min_by(|a, b| overlap(a).total_cmp(&overlap(b)));
+            let Some(place) = best else { continue };
+            taken.push(place);
+            texts.push(svg::text(place[0], place[3] - 2.0, "start", "name", name));
         }
         html! { @for text in texts { (text) } }
     }
@@ -392,6 +420,42 @@ mod tests {
         let drawn = images(&points, "t", "b");
         assert_eq!(drawn.matches("<polyline").count(), 2);
         assert_eq!(drawn.matches("central only").count(), 2);
+    }
+
+    #[test]
+    fn names_are_short_and_lie_neither_on_each_other_nor_on_points() {
+        assert_eq!(label("blocks=8,nodes=64,tolerance=1"), "8°, 64, t=1");
+        let default = Contender::Blocks(Preset::Default.settings()).to_string();
+        assert_eq!(label(&default), "default");
+        assert_eq!(label("paper"), "paper");
+        // Four points of a front within a few pixels.
+        let points: Vec<Point> = (0..4)
+            .map(|k| {
+                let k = f64::from(k);
+                point(&format!("method {k}"), 10.0 + 0.1 * k, 0.1 - 0.001 * k)
+            })
+            .chain([point("far", 1e5, 1e-3)])
+            .collect();
+        let drawn = methods(&points, "t", "b");
+        let first = drawn.split("<g transform").nth(1).unwrap();
+        let attribute = |text: &str, name: &str| -> f64 {
+            let value = text.split(&format!(" {name}=\"")).nth(1).unwrap();
+            value.split('"').next().unwrap().parse().unwrap()
+        };
+        let ys: Vec<(f64, f64)> = first
+            .split("<text")
+            .filter(|text| text.contains("class=\"name\""))
+            .map(|text| (attribute(text, "x"), attribute(text, "y")))
+            .collect();
+        assert_eq!(ys.len(), 5);
+        for (k, a) in ys.iter().enumerate() {
+            for b in &ys[k + 1..] {
+                assert!(
+                    (a.1 - b.1).abs() >= 10.0 || (a.0 - b.0).abs() >= 30.0,
+                    "{ys:?}"
+                );
+            }
+        }
     }
 
     #[test]
