@@ -1,10 +1,10 @@
 //! How much cutting a fill can afford.
 //!
-//! Cutting a pair of patches costs some sixteen fine blocks. What it gains is not known beforehand; the
-//! best sign of it is by how much a fine block differs from the coarse one where the values change
-//! most ([`Refiner::doubt`]). So the pairs doubted most are cut, as many as a budget allows: the
-//! *tolerance* above which a pair is cut is raised until the share of pairs beyond it, in a sample
-//! of all, costs no more. On a dense plan few pairs are doubted, and nothing is raised.
+//! A pair of patches has some sixteen pairs of parts. What a fine block gains in one of them is not known
+//! beforehand; the best sign of it is by how much a fine block differs from the coarse one where the
+//! values change most ([`Refiner::doubts`]). So the parts doubted most get one, as many as a budget
+//! allows: the *tolerance* above which they do is raised until the parts beyond it, in a sample of all
+//! pairs, are no more. On a dense plan few are doubted, and nothing is raised.
 
 use super::Settings;
 use super::levels::Neighbours;
@@ -32,27 +32,22 @@ pub fn affordable_tolerance(
     let pairs: Vec<(usize, usize)> = (0..n).flat_map(|p| (p..n).map(move |q| (p, q))).collect();
     let stride = (pairs.len() as f64 / SAMPLE as f64).max(1.0);
     let sampled = ((pairs.len() as f64 / stride) as usize).min(pairs.len());
-    let mut doubts: Vec<(f32, f32)> = (0..sampled)
+    let mut doubts: Vec<f32> = (0..sampled)
         .into_par_iter()
         .map_init(Refiner::default, |refiner, k| {
             let (p, q) = pairs[scattered(k, stride, pairs.len())];
             let (p, q) = (&cover.patches[p], &cover.patches[q]);
-            let blocks = p.children.len() * q.children.len();
-            (refiner.doubt(nodes, settings, p, q), blocks as f32)
+            refiner.doubts(nodes, settings, p, q).to_vec()
         })
+        .flatten_iter()
+        .filter(|doubt| *doubt > settings.tolerance)
         .collect();
-    doubts.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut left = settings.budget * sampled as f32;
-    for (doubt, blocks) in doubts {
-        left -= blocks;
-        if doubt <= settings.tolerance {
-            break;
-        }
-        if left < 0.0 {
-            return (doubt / ROUND).ceil() * ROUND;
-        }
+    let affordable = (settings.budget * sampled as f32) as usize;
+    if doubts.len() <= affordable {
+        return settings.tolerance;
     }
-    settings.tolerance
+    let (_, doubt, _) = doubts.select_nth_unstable_by(affordable, |a, b| b.total_cmp(a));
+    (*doubt / ROUND).ceil() * ROUND
 }
 
 /// The `k`th of a sample: one of each stretch of so many numbers, at a place within it that does not

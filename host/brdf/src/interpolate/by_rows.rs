@@ -6,9 +6,11 @@
 
 use super::Settings;
 use super::blend::{Corners, Shifts};
-use super::fill::{FillError, Fit, bounded_exp};
+use super::exponential::exponentials;
+use super::fill::{FillError, Fit};
 use super::known::Known;
 use super::refine::Refiner;
+use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -24,6 +26,7 @@ struct Work {
     refiner: Refiner,
     logs: Vec<[f32; 3]>,
     shifts: Shifts,
+    arch: Arch,
 }
 
 impl<'a> ByRows<'a> {
@@ -95,6 +98,7 @@ impl<'a> ByRows<'a> {
         let numbers = (first, second);
         self.corners
             .blend(&self.fit.cover, numbers, &mut work.logs, &mut work.shifts);
+        exponentials(work.arch, &mut work.logs);
         let width = pair.1.directions.len();
         for a in 0..patches[p].directions.len() {
             for (b, view) in patches[q].directions.iter().enumerate() {
@@ -102,7 +106,7 @@ impl<'a> ByRows<'a> {
                 let swap = q < p || (p == q && b < a);
                 let place = if swap { b * width + a } else { a * width + b };
                 for c in 0..3 {
-                    rows[c][a * n + *view as usize] = bounded_exp(work.logs[place][c]);
+                    rows[c][a * n + *view as usize] = work.logs[place][c];
                 }
             }
         }

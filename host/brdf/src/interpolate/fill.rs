@@ -3,12 +3,14 @@
 use super::Settings;
 use super::blend::{Corners, Shifts};
 use super::error_bars::{Calibration, ErrorBars, origins};
+use super::exponential::exponentials;
 use super::known::Known;
 use super::levels::Levels;
 use super::patches::{Cover, Patch, cover};
 use super::refine::Refiner;
 use crate::dense::DenseBrdf;
 use crate::grid::Grid;
+use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
 
@@ -98,9 +100,7 @@ fn solve(
                     values.load(grid, pair, &mut work.logs);
                 }
                 corners.blend(&fit.cover, (p, q), &mut work.logs, &mut work.shifts);
-                for log in &mut work.logs {
-                    *log = log.map(bounded_exp);
-                }
+                exponentials(work.arch, &mut work.logs);
                 values.store_both(grid, pair, &work.logs);
                 if calibration.is_some() {
                     errors.load(grid, pair, &mut work.errors);
@@ -182,6 +182,7 @@ struct Blended {
     logs: Vec<[f32; 3]>,
     errors: Vec<[f32; 3]>,
     shifts: Shifts,
+    arch: Arch,
 }
 
 /// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
@@ -249,11 +250,6 @@ fn cells_of<'a>(grid: Grid, p: &'a Patch, q: &'a Patch) -> impl Iterator<Item = 
             .iter()
             .map(move |view| grid.cell(*light as usize, *view as usize))
     })
-}
-
-/// e^±60 are far beyond any BRDF and far within single precision.
-pub(super) fn bounded_exp(log: f32) -> f32 {
-    log.clamp(-60.0, 60.0).exp()
 }
 
 /// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.

@@ -13,6 +13,7 @@ pub mod by_rows;
 pub mod cholesky;
 pub mod coordinates;
 pub mod error_bars;
+pub mod exponential;
 pub mod fill;
 pub mod from_corners;
 pub mod hold_out;

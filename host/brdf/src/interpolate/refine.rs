@@ -3,8 +3,9 @@
 //!
 //! The coarse block goes through merged nodes. Where its values change most, its own variance is
 //! looked at; if that is more than what noise explains, one fine block is fitted there through the
-//! bins' own nodes; if the two differ by more than the tolerance, every part gets a block of its own,
-//! and these are blended.
+//! bins' own nodes. By how much the two differ there, the other parts are doubted in proportion to
+//! how much their values change; parts that are doubted beyond the tolerance get a block of their own,
+//! the others keep the coarse one, and all are blended.
 
 use super::Settings;
 use super::blend::{Shifts, difference, limit_of};
@@ -25,6 +26,9 @@ pub struct Refiner {
     /// serves again.
     trial: BlockSolver,
     trial_at: Option<(Vec3, Vec3)>,
+    /// By how many standard deviations of a sample the coarse block may be off in each pair of parts; none
+    /// where it is sure of itself.
+    doubts: Vec<f32>,
     /// Merged nodes whose bins are looked at.
     near: Vec<Found>,
     found: Vec<Found>,
@@ -35,6 +39,8 @@ pub struct Refiner {
     corners: Vec<[f32; 3]>,
     /// Logarithms of the cells of one part.
     part: Vec<[f32; 3]>,
+    /// What the coarse block gives at the pair's corners, where parts may give something else.
+    whole_corners: Vec<[f32; 3]>,
     /// The corners of all parts, one part after the other.
     part_corners: Vec<[f32; 3]>,
     /// How many parts a corner of the pair is in.
@@ -96,20 +102,21 @@ impl Refiner {
         }
     }
 
-    /// By how many standard deviations of a sample a fine block differs from the coarse one of a pair
-    /// where that changes most; 0 where the coarse one is sure enough of itself.
-    pub fn doubt(
+    /// By how many standard deviations of a sample a fine block may differ from the coarse one in each
+    /// pair of parts; none where the coarse one is sure enough of itself.
+    pub fn doubts(
         &mut self,
         levels: &impl Neighbours,
         settings: &Settings,
         p: &Patch,
         q: &Patch,
-    ) -> f32 {
+    ) -> &[f32] {
         self.fit_whole(levels, settings, p, q);
-        self.doubt_of_whole(levels, settings, p, q)
+        self.doubt_whole(levels, settings, p, q);
+        &self.doubts
     }
 
-    /// All parts of a pair, each in a block of its own, and no seams between them.
+    /// All parts of a pair, those that are doubted in a block of their own, and no seams between them.
     fn solve_parts(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         let mut logs = std::mem::take(&mut self.logs);
         let cells = p.directions.len() * q.directions.len();
@@ -120,10 +127,15 @@ impl Refiner {
         self.part_corners.clear();
         self.parts_at.clear();
         self.parts_at.resize(self.corners.len(), 0);
+        self.whole_corners.clone_from(&self.corners);
         self.corners.fill([0.0; 3]);
-        for (a, b) in pairs_of_parts(p, q) {
+        for (number, (a, b)) in pairs_of_parts(p, q).enumerate() {
             let first = self.part_corners.len();
-            self.solve_part(levels, settings, a, b);
+            if self.is_part_doubted(settings, number) {
+                self.solve_part(levels, settings, a, b);
+            } else {
+                self.keep_part(settings, a, b, q);
+            }
             for (k, place) in places_in(a, b, q).enumerate() {
                 logs[place] = self.part[k];
                 if self.with_variances {
@@ -175,25 +187,52 @@ impl Refiner {
         q: &Patch,
     ) -> bool {
         self.count.pairs += 1;
-        let cut = settings.cuts()
-            && !p.children.is_empty()
-            && (settings.tolerance == 0.0
-                || self.doubt_of_whole(levels, settings, p, q) > settings.tolerance);
+        let cut = settings.cuts() && !p.children.is_empty() && {
+            self.doubt_whole(levels, settings, p, q);
+            let parts = p.children.len() * q.children.len();
+            (0..parts).any(|number| self.is_part_doubted(settings, number))
+        };
         self.count.cut += usize::from(cut);
         cut
     }
 
-    /// [`Self::doubt`] of the coarse block that was fitted last.
-    fn doubt_of_whole(
+    /// Whether a pair of parts needs a block of its own.
+    fn is_part_doubted(&self, settings: &Settings, number: usize) -> bool {
+        settings.tolerance == 0.0
+            || self
+                .doubts
+                .get(number)
+                .is_some_and(|doubt| *doubt > settings.tolerance)
+    }
+
+    /// [`Self::doubts`] of the coarse block that was fitted last.
+    fn doubt_whole(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
+        self.doubts.clear();
+        if settings.tolerance == 0.0 {
+            return;
+        }
+        let changes = pairs_of_parts(p, q).map(|(a, b)| change(&self.corners, corners_in(a, b, q)));
+        self.doubts.extend(changes);
+        let steepest = pairs_of_parts(p, q)
+            .zip(&self.doubts)
+            .max_by(|a, b| a.1.total_cmp(b.1));
+        let Some(((a, b), most)) = steepest else {
+            return;
+        };
+        let most = most.max(f32::MIN_POSITIVE);
+        let doubt = self.doubt_between(levels, settings, a, b);
+        self.doubts.iter_mut().for_each(|d| *d *= doubt / most);
+    }
+
+    /// By how many standard deviations of a sample a fine block differs from the coarse one in a pair of
+    /// parts; 0 where the coarse one is sure enough of itself.
+    fn doubt_between(
         &mut self,
         levels: &impl Neighbours,
         settings: &Settings,
-        p: &Patch,
-        q: &Patch,
+        a: &Child,
+        b: &Child,
     ) -> f32 {
-        let Some((a, b)) = steepest(&self.corners, p, q) else {
-            return 0.0;
-        };
         self.places.clear();
         for light in some_of(&a.patch.vectors) {
             for view in some_of(&b.patch.vectors) {
@@ -284,7 +323,9 @@ impl Refiner {
             parts.max_by(|a, b| along(&patch.children[*a]).total_cmp(&along(&patch.children[*b])))
         };
         let block = match (nearest(p, light), nearest(q, view)) {
-            (Some(a), Some(b)) if cut => {
+            (Some(a), Some(b))
+                if cut && self.is_part_doubted(settings, a * q.children.len() + b) =>
+            {
                 let centre = (p.children[a].patch.centre, q.children[b].patch.centre);
                 self.fit_part(levels, settings, centre.0, centre.1);
                 &mut self.fine
@@ -317,6 +358,7 @@ impl Refiner {
     fn fit_part(&mut self, levels: &impl Neighbours, settings: &Settings, light: Vec3, view: Vec3) {
         let centre = settings.coordinates.point(light, view);
         levels.around(&centre, settings.nodes / 2, &mut self.near);
+        keep_nearest(&mut self.near, settings.nodes / 2);
         levels.expand(&centre, &self.near, &mut self.found);
         self.count.blocks += 1;
         let (found, detail) = (&mut self.found, Detail::Bins);
@@ -340,6 +382,20 @@ impl Refiner {
         if self.with_variances {
             self.part_variances.clear();
             self.fine
+                .variances_at(&self.places, &mut self.part_variances);
+        }
+    }
+
+    /// The same in the coarse block.
+    fn keep_part(&mut self, settings: &Settings, a: &Child, b: &Child, q: &Patch) {
+        let corners = corners_in(a, b, q).map(|corner| self.whole_corners[corner]);
+        self.part_corners.extend(corners);
+        write_places(settings, &a.patch, &b.patch, &mut self.places);
+        self.part.clear();
+        self.whole.evaluate(&self.places, &mut self.part);
+        if self.with_variances {
+            self.part_variances.clear();
+            self.whole
                 .variances_at(&self.places, &mut self.part_variances);
         }
     }
@@ -425,30 +481,15 @@ fn pairs_of_parts<'a>(
         .flat_map(|a| q.children.iter().map(move |b| (a, b)))
 }
 
-/// The pair of parts between whose corners the values change most; `None` where there are no parts.
-fn steepest<'a>(
-    corners: &[[f32; 3]],
-    p: &'a Patch,
-    q: &'a Patch,
-) -> Option<(&'a Child, &'a Child)> {
-    let mut best = None;
-    let mut steepest = f32::NEG_INFINITY;
-    for a in &p.children {
-        for b in &q.children {
-            let mut low = [f32::INFINITY; 3];
-            let mut high = [f32::NEG_INFINITY; 3];
-            for corner in corners_in(a, b, q) {
-                for c in 0..3 {
-                    low[c] = low[c].min(corners[corner][c]);
-                    high[c] = high[c].max(corners[corner][c]);
-                }
-            }
-            let change: f32 = (0..3).map(|c| high[c] - low[c]).sum();
-            if change > steepest {
-                steepest = change;
-                best = Some((a, b));
-            }
+/// By how much values change among some corners, summed over the channels.
+fn change(values: &[[f32; 3]], corners: impl Iterator<Item = usize>) -> f32 {
+    let mut low = [f32::INFINITY; 3];
+    let mut high = [f32::NEG_INFINITY; 3];
+    for corner in corners {
+        for c in 0..3 {
+            low[c] = low[c].min(values[corner][c]);
+            high[c] = high[c].max(values[corner][c]);
         }
     }
-    best
+    (0..3).map(|c| high[c] - low[c]).sum()
 }

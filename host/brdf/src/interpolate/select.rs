@@ -23,7 +23,7 @@ const CANDIDATES: [Coordinates; 4] = [
     Coordinates::SumDifference { weight: 1.0 },
 ];
 
-/// A ratio of errors that so few tests cannot tell from 1.
+/// A ratio of errors that means nothing.
 const TIE: f64 = 1.05;
 /// Only where both elevations are below this do held-out frames have others all around them; beyond, it
 /// is extrapolation that would be judged. Degrees.
@@ -75,19 +75,17 @@ pub fn select(known: &Known, base: Settings) -> Selection {
     }
     let trials: Vec<Trial> = candidates
         .into_iter()
-        .zip(squares)
+        .zip(&squares)
         .filter(|(_, squares)| !squares.is_empty())
         .map(|(settings, squares)| Trial {
             settings,
-            log_rms: rms(&squares),
+            log_rms: mean(squares).sqrt(),
         })
         .collect();
-    let best = trials
-        .iter()
-        .map(|t| t.log_rms)
-        .fold(f64::INFINITY, f64::min);
-    if let Some(chosen) = trials.iter().find(|t| t.log_rms <= TIE * best) {
-        settings = chosen.settings;
+    let best = squares.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)));
+    let as_good = best.and_then(|best| squares.iter().position(|other| tie(best, other)));
+    if let Some(trial) = as_good.and_then(|number| trials.get(number)) {
+        settings = trial.settings;
     }
     let cover = cover(bins.grid(), &settings.patch_sizes_deg());
     let sorted = known.sorted_for(settings.coordinates);
@@ -113,6 +111,19 @@ fn square(prediction: &Prediction) -> Option<f64> {
     (f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()).then(|| squares.sum::<f64>() / 3.0)
 }
 
-fn rms(squares: &[f64]) -> f64 {
-    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+/// Whether a candidate is as good as the best, as far as the same tests can tell: nearly as good in any
+/// case, or worse by less than the standard error of their difference, because a few tests in a sharp
+/// highlight may make all of that.
+fn tie(best: &[f64], other: &[f64]) -> bool {
+    if mean(other) <= TIE * TIE * mean(best) {
+        return true;
+    }
+    let differences: Vec<f64> = other.iter().zip(best).map(|(o, b)| o - b).collect();
+    let worse = mean(&differences);
+    let squares: Vec<f64> = differences.iter().map(|d| (d - worse).powi(2)).collect();
+    worse <= (mean(&squares) / squares.len() as f64).sqrt()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
