@@ -379,7 +379,7 @@ fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
 }
 
 #[test]
-fn on_a_sparse_plan_cutting_stays_within_its_budget() {
+fn on_a_sparse_plan_fine_blocks_stay_within_their_budget() {
     let grid = Grid::with_step_deg(4.0).unwrap();
     let bins = Bins::new(grid, &measure(&Kurt::two_thread_fabric()));
     let known = Known::new(&bins);
@@ -397,15 +397,12 @@ fn on_a_sparse_plan_cutting_stays_within_its_budget() {
         let levels = Levels::with_mirror_images(half_of_nodes(bins.bins(), settings.coordinates));
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let mut refiner = Refiner::default();
-        let mut blocks = 0;
         for (k, p) in patches.iter().enumerate() {
             for q in &patches[k..] {
-                let before = refiner.count.cut;
                 refiner.solve(&levels, settings, p, q);
-                blocks += (refiner.count.cut - before) * p.children.len() * q.children.len();
             }
         }
-        blocks as f32 / refiner.count.pairs as f32
+        refiner.count.parts as f32 / refiner.count.pairs as f32
     };
     let unlimited = chosen(f32::INFINITY);
     assert_eq!(unlimited.tolerance, Settings::DEFAULT.tolerance);

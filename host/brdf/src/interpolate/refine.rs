@@ -67,17 +67,8 @@ pub struct Count {
     pub pairs: usize,
     /// Pairs that were cut.
     pub cut: usize,
-    /// Blocks fitted, coarse and fine, trials included.
-    pub blocks: usize,
-}
-
-impl Count {
-    /// Adds another thread's numbers.
-    pub fn add(&mut self, other: Count) {
-        self.pairs += other.pairs;
-        self.cut += other.cut;
-        self.blocks += other.blocks;
-    }
+    /// Pairs of parts that got a block of their own.
+    pub parts: usize,
 }
 
 impl Refiner {
@@ -132,6 +123,7 @@ impl Refiner {
         for (number, (a, b)) in pairs_of_parts(p, q).enumerate() {
             let first = self.part_corners.len();
             if self.is_part_doubted(settings, number) {
+                self.count.parts += 1;
                 self.solve_part(levels, settings, a, b);
             } else {
                 self.keep_part(settings, a, b, q);
@@ -221,7 +213,9 @@ impl Refiner {
         };
         let most = most.max(f32::MIN_POSITIVE);
         let doubt = self.doubt_between(levels, settings, a, b);
-        self.doubts.iter_mut().for_each(|d| *d *= doubt / most);
+        self.doubts
+            .iter_mut()
+            .for_each(|d| *d = doubt * (*d / most).sqrt());
     }
 
     /// By how many standard deviations of a sample a fine block differs from the coarse one in a pair of
@@ -345,7 +339,6 @@ impl Refiner {
     fn fit_whole(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         let centre = settings.coordinates.point(p.centre, q.centre);
         levels.around(&centre, settings.nodes, &mut self.found);
-        self.count.blocks += 1;
         self.trial_at = None;
         let (found, detail) = (&mut self.found, Detail::Merged);
         fit(&mut self.whole, levels, settings, detail, centre, found);
@@ -360,7 +353,6 @@ impl Refiner {
         levels.around(&centre, settings.nodes / 2, &mut self.near);
         keep_nearest(&mut self.near, settings.nodes / 2);
         levels.expand(&centre, &self.near, &mut self.found);
-        self.count.blocks += 1;
         let (found, detail) = (&mut self.found, Detail::Bins);
         fit(&mut self.fine, levels, settings, detail, centre, found);
     }
