@@ -75,7 +75,7 @@ fn main() {
             None
         };
         let cpu = cpu_seconds();
-        let known = Known::new(&bins);
+        let known = Known::thinned(&bins, base.one_bin_in);
         let sort_s = cpu_seconds() - cpu;
         let cpu = cpu_seconds();
         let selection = match fixed {

@@ -276,7 +276,8 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
-        let levels = Levels::with_mirror_images(half_of_nodes(bins.bins(), settings.coordinates));
+        let levels =
+            Levels::with_mirror_images(half_of_nodes(bins.bins(), 1, settings.coordinates), 1);
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let around = |d: Vec3| {
             let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
@@ -394,7 +395,8 @@ fn on_a_sparse_plan_fine_blocks_stay_within_their_budget() {
     };
     // What the plan asks for, and a half of it.
     let blocks_cut = |settings: &Settings| {
-        let levels = Levels::with_mirror_images(half_of_nodes(bins.bins(), settings.coordinates));
+        let levels =
+            Levels::with_mirror_images(half_of_nodes(bins.bins(), 1, settings.coordinates), 1);
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let mut refiner = Refiner::default();
         for (k, p) in patches.iter().enumerate() {

@@ -152,7 +152,9 @@ pub fn fill(
     let total = samples.len();
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
-    let known = progress.stage("sorting", |_| anyhow::Ok(Known::new(&bins)))?;
+    let known = progress.stage("sorting", |_| {
+        anyhow::Ok(Known::thinned(&bins, base.one_bin_in))
+    })?;
     let settings = progress.stage("choosing settings", |_| {
         anyhow::Ok(interpolate::select(&known, base).settings)
     })?;
@@ -303,7 +305,9 @@ impl Fill {
         let total = samples.len();
         let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
         drop(samples);
-        let known = progress.stage("sorting", |_| anyhow::Ok(Known::new(&bins)))?;
+        let known = progress.stage("sorting", |_| {
+            anyhow::Ok(Known::thinned(&bins, base.one_bin_in))
+        })?;
         let settings = progress.stage("choosing settings", |_| {
             anyhow::Ok(interpolate::select(&known, base).settings)
         })?;

@@ -191,43 +191,60 @@ struct SharedPlanes([Vec<AtomicU32>; 3]);
 
 impl SharedPlanes {
     fn new(length: usize) -> Self {
-        Self([(); 3].map(|()| (0..length).map(|_| AtomicU32::new(0)).collect()))
+        let plane = || (0..length).into_par_iter().map(|_| AtomicU32::new(0));
+        Self([(); 3].map(|()| plane().collect()))
     }
 
     /// Stores the cells of a pair, light by light.
     fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
-        for (cell, value) in cells_of(grid, p, q).zip(cells) {
-            for c in 0..3 {
-                self.0[c][cell].store(value[c].to_bits(), Relaxed);
+        let width = q.directions.len();
+        for (light, row) in p.directions.iter().zip(cells.chunks_exact(width)) {
+            for (first, view, length) in runs(q) {
+                let cells = &row[first..first + length];
+                self.store_run(grid.cell(*light as usize, view), cells.iter());
             }
         }
     }
 
     /// What [`Self::store`] stored.
     fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; 3]>) {
-        let at = |cell: usize| [0, 1, 2].map(|c| f32::from_bits(self.0[c][cell].load(Relaxed)));
         cells.clear();
-        cells.extend(cells_of(grid, p, q).map(at));
+        for light in &p.directions {
+            for (_, view, length) in runs(q) {
+                let from = grid.cell(*light as usize, view);
+                let planes = [0, 1, 2].map(|c| &self.0[c][from..from + length]);
+                cells.extend(
+                    (0..length).map(|k| planes.map(|p| f32::from_bits(p[k].load(Relaxed)))),
+                );
+            }
+        }
     }
 
-    /// Stores the cells of a pair and their mirror images.
+    /// Stores the cells of a pair and their mirror images. Within one patch both orders of a pair are
+    /// there; the first serves for both.
     fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
-        let same = std::ptr::eq(p, q);
-        let mut cells = cells.iter();
-        for (a, light) in p.directions.iter().enumerate() {
-            for ((b, view), value) in q.directions.iter().enumerate().zip(&mut cells) {
-                // Within one patch both orders of a pair are there; the first serves for both.
-                if same && b < a {
-                    continue;
-                }
-                let (light, view) = (*light as usize, *view as usize);
-                let (cell, mirror) = (grid.cell(light, view), grid.cell(view, light));
-                for c in 0..3 {
-                    let bits = value[c].to_bits();
-                    self.0[c][cell].store(bits, Relaxed);
-                    self.0[c][mirror].store(bits, Relaxed);
-                }
+        self.store(grid, (p, q), cells);
+        let (same, width) = (std::ptr::eq(p, q), q.directions.len());
+        for (b, view) in q.directions.iter().enumerate() {
+            for (first, light, length) in runs(p) {
+                let length = if same {
+                    length.min((b + 1).saturating_sub(first))
+                } else {
+                    length
+                };
+                let column = cells.iter().skip(first * width + b).step_by(width);
+                self.store_run(grid.cell(*view as usize, light), column.take(length));
             }
+        }
+    }
+
+    /// Stores cells that follow each other.
+    fn store_run<'a>(&self, from: usize, cells: impl ExactSizeIterator<Item = &'a [f32; 3]>) {
+        let [red, green, blue] = [0, 1, 2].map(|c| &self.0[c][from..from + cells.len()]);
+        for (k, cell) in cells.enumerate() {
+            red[k].store(cell[0].to_bits(), Relaxed);
+            green[k].store(cell[1].to_bits(), Relaxed);
+            blue[k].store(cell[2].to_bits(), Relaxed);
         }
     }
 
@@ -244,12 +261,18 @@ impl SharedPlanes {
     }
 }
 
-fn cells_of<'a>(grid: Grid, p: &'a Patch, q: &'a Patch) -> impl Iterator<Item = usize> + use<'a> {
-    p.directions.iter().flat_map(move |light| {
-        q.directions
-            .iter()
-            .map(move |view| grid.cell(*light as usize, *view as usize))
-    })
+/// Directions of a patch that follow each other: where the first stands in the patch, its number, and how
+/// many they are.
+fn runs(patch: &Patch) -> impl Iterator<Item = (usize, usize, usize)> {
+    let mut first = 0;
+    patch
+        .directions
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(move |run| {
+            let place = first;
+            first += run.len();
+            (place, run[0] as usize, run.len())
+        })
 }
 
 /// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.

@@ -25,13 +25,21 @@ pub(super) const MANY_BINS: usize = 1_000_000;
 impl<'a> Known<'a> {
     /// Sorts the bins' nodes.
     pub fn new(bins: &'a Bins) -> Self {
-        Self::sorted_in(bins, SORTED_IN)
+        Self::thinned(bins, 1)
     }
 
-    fn sorted_in(bins: &'a Bins, coordinates: Coordinates) -> Self {
+    /// Sorts the nodes of one bin in so many, where there are many: neighbours on the sheet of one frame
+    /// tell much the same, and sorting them all takes longer than a quick fill.
+    pub fn thinned(bins: &'a Bins, one_in: usize) -> Self {
+        let many = bins.bins().len() >= MANY_BINS;
+        Self::sorted_in(bins, if many { one_in } else { 1 }, SORTED_IN)
+    }
+
+    fn sorted_in(bins: &'a Bins, one_in: usize, coordinates: Coordinates) -> Self {
+        let nodes = half_of_nodes(bins.bins(), one_in, coordinates);
         Self {
             bins,
-            levels: Levels::with_mirror_images(half_of_nodes(bins.bins(), coordinates)),
+            levels: Levels::with_mirror_images(nodes, one_in),
             coordinates,
         }
     }
@@ -39,7 +47,7 @@ impl<'a> Known<'a> {
     /// The same, sorted anew for other coordinates where this order would not serve for them.
     pub(super) fn sorted_for(&self, coordinates: Coordinates) -> Option<Self> {
         let few = self.bins.bins().len() < MANY_BINS;
-        (few && coordinates != self.coordinates).then(|| Self::sorted_in(self.bins, coordinates))
+        (few && coordinates != self.coordinates).then(|| Self::sorted_in(self.bins, 1, coordinates))
     }
 
     /// The bins.

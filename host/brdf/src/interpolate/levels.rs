@@ -65,14 +65,15 @@ pub trait Neighbours {
 impl Levels {
     /// Sorts and merges the nodes.
     pub fn new(nodes: Vec<Node>) -> Self {
-        let (bins, starts) = in_order(nodes);
+        let (bins, starts) = in_order(nodes, 1);
         Self::sorted(bins, starts, false)
     }
 
     /// The same of `half` of the nodes, and the mirror images of all these: half the work. No mirror image
     /// of a node is to be in the half itself.
-    pub fn with_mirror_images(half: Vec<Node>) -> Self {
-        let (mut bins, mut starts) = in_order(half);
+    /// Each node stands for `stands_for` bins, and so fewer are merged.
+    pub fn with_mirror_images(half: Vec<Node>, stands_for: usize) -> Self {
+        let (mut bins, mut starts) = in_order(half, stands_for);
         let n = bins.len();
         append_mirror_images(&mut bins);
         starts.pop();
@@ -219,8 +220,9 @@ pub fn keep_nearest(found: &mut Vec<Found>, n: usize) -> f32 {
 
 /// Sorts nodes so that neighbours follow each other. Also where those that are to be merged start, and the
 /// end of the last.
-fn in_order(mut nodes: Vec<Node>) -> (Vec<Node>, Vec<u32>) {
-    let depth = (nodes.len() / MERGE).max(1).ilog2();
+fn in_order(mut nodes: Vec<Node>, stands_for: usize) -> (Vec<Node>, Vec<u32>) {
+    let merged = (nodes.len() * stands_for / MERGE).min(nodes.len());
+    let depth = merged.max(1).ilog2();
     split(&mut nodes, depth);
     let mut starts = Vec::with_capacity((1 << depth) + 1);
     push_starts(0, nodes.len(), depth, &mut starts);
@@ -379,8 +381,20 @@ mod tests {
     }
 
     #[test]
+    fn nodes_that_stand_for_many_bins_are_merged_by_few_but_never_by_none() {
+        for stands_for in [1, 4, 1000] {
+            let levels = Levels::with_mirror_images(lattice(), stands_for);
+            let merged = levels.nodes(Detail::Merged).len();
+            assert!((0..merged).all(|k| !levels.bins_of(k).is_empty()));
+            assert_eq!(levels.bins_of(merged - 1).end, 8000);
+            let wanted = (8000 * stands_for / MERGE).min(8000);
+            assert!(merged <= wanted && 2 * merged > wanted, "{merged}");
+        }
+    }
+
+    #[test]
     fn mirror_images_stand_at_their_places_and_share_their_values() {
-        let levels = Levels::with_mirror_images(lattice());
+        let levels = Levels::with_mirror_images(lattice(), 1);
         for detail in [Detail::Bins, Detail::Merged] {
             let (half, images) = levels
                 .nodes(detail)

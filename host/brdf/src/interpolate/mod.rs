@@ -44,6 +44,8 @@ pub struct Settings {
     pub budget: f32,
     /// Nodes a block.
     pub nodes: usize,
+    /// Of many bins, one in so many is looked at: for [`Known::thinned`].
+    pub one_bin_in: usize,
     /// Where distances are taken.
     pub coordinates: Coordinates,
     /// Range of the kernel in radii of the neighbourhood; at least 3.5.
@@ -83,17 +85,18 @@ impl Preset {
 
     /// Its settings; [`select`] chooses the coordinates and measures the noise.
     pub const fn settings(self) -> Settings {
-        let (block_deg, tolerance, budget, nodes) = match self {
-            Preset::Preview => (8.0, f32::INFINITY, 0.0, 32),
-            Preset::Fast => (8.0, 2.0, 2.0, 64),
-            Preset::Default => (8.0, 1.0, 6.0, 128),
-            Preset::Best => (8.0, 0.5, f32::INFINITY, 256),
+        let (block_deg, tolerance, budget, nodes, one_bin_in) = match self {
+            Preset::Preview => (8.0, f32::INFINITY, 0.0, 32, 8),
+            Preset::Fast => (8.0, 2.0, 2.0, 64, 1),
+            Preset::Default => (8.0, 1.0, 6.0, 128, 1),
+            Preset::Best => (8.0, 0.5, f32::INFINITY, 256, 1),
         };
         Settings {
             block_deg,
             tolerance,
             budget,
             nodes,
+            one_bin_in,
             coordinates: Coordinates::HalfDifference { weight: 0.5 },
             range: 8.0,
             noise_variance: 1e-4,
@@ -151,6 +154,10 @@ impl std::fmt::Display for Settings {
             self.range,
             100.0 * self.noise_variance.sqrt(),
             self.nugget_min
-        )
+        )?;
+        if self.one_bin_in > 1 {
+            write!(f, ", one bin in {}", self.one_bin_in)?;
+        }
+        Ok(())
     }
 }

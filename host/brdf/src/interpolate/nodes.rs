@@ -40,13 +40,15 @@ impl Node {
 /// make dark values negative, and their logarithm must stay finite.
 const FLOOR_SHARE: f32 = 1e-4;
 
-/// A node of each bin, numbered as they come: the bin's own or its mirror image (light and view exchanged),
+/// A node of one bin in so many, numbered as all bins come: the bin's own or its mirror image (light and view exchanged),
 /// whichever's difference of light and view points to positive x. The others are the mirror images of these.
-pub fn half_of_nodes(bins: &[Bin], coordinates: Coordinates) -> Vec<Node> {
+pub fn half_of_nodes(bins: &[Bin], one_in: usize, coordinates: Coordinates) -> Vec<Node> {
     let floor = floor_of(bins.iter());
-    bins.par_iter()
-        .enumerate()
-        .map(|(number, bin)| {
+    (0..bins.len())
+        .into_par_iter()
+        .step_by(one_in.max(1))
+        .map(|number| {
+            let bin = &bins[number];
             let node = Node {
                 point: coordinates.point(bin.light.map(f64::from), bin.view.map(f64::from)),
                 log_value: [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln()),

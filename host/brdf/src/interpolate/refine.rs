@@ -276,7 +276,8 @@ impl Refiner {
         let difference = self
             .from_corners
             .largest_difference(weights, lights, views, &self.part);
-        difference <= SMOOTH * settings.noise_sigma()
+        let tolerated = (SMOOTH * settings.tolerance.max(1.0)).min(SMOOTH_MAX);
+        difference <= tolerated * settings.noise_sigma()
     }
 
     /// Whether the last pair needs no cells: they follow from its corners.
@@ -436,8 +437,11 @@ fn places_of_some(directions: &[Vec3]) -> impl Iterator<Item = usize> + Clone + 
     (0..directions.len()).step_by(directions.len().div_ceil(4).max(1))
 }
 
-/// Cells may differ from what the corners give by this many standard deviations of a sample.
+/// Cells may differ from what the corners give by this many standard deviations of a sample, times the
+/// tolerance …
 const SMOOTH: f32 = 0.15;
+/// … and by no more than this.
+const SMOOTH_MAX: f32 = 1.0;
 
 /// A coarse block whose own variance is less than this share of what would be tolerated is not doubted:
 /// hardly any of those that must be cut are as sure of themselves, and asking all would cost as much

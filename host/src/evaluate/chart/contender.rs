@@ -204,7 +204,7 @@ fn run_cellwise(
 
 fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
     let start = cpu_seconds();
-    let known = Known::new(bins);
+    let known = Known::thinned(bins, base.one_bin_in);
     let settings = interpolate::select(&known, *base).settings;
     let dense = interpolate::fill(&known, &settings, &|_| ())?;
     let core_s = cpu_seconds() - start;
@@ -227,11 +227,15 @@ impl fmt::Display for Contender {
                     nodes,
                     tolerance,
                     budget,
+                    one_bin_in,
                     ..
                 } = settings;
                 write!(f, "blocks={block_deg},nodes={nodes},tolerance={tolerance}")?;
                 if budget.is_finite() {
                     write!(f, ",budget={budget}")?;
+                }
+                if *one_bin_in > 1 {
+                    write!(f, ",one-bin-in={one_bin_in}")?;
                 }
                 Ok(())
             }
@@ -242,21 +246,24 @@ impl fmt::Display for Contender {
 impl FromStr for Contender {
     type Err = SettingsError;
 
-    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B`, or the name of a method that works cell by cell.
+    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
     fn from_str(text: &str) -> Result<Self, SettingsError> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
             let (nodes, rest) = rest.split_once(",tolerance=")?;
+            let (rest, one_bin_in) = rest.split_once(",one-bin-in=").unwrap_or((rest, "1"));
             let (tolerance, budget) = rest.split_once(",budget=").unwrap_or((rest, "inf"));
             let block_deg = block.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
             let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
             let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
+            let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
             Some(Contender::Blocks(Settings {
                 block_deg,
                 nodes,
                 tolerance,
                 budget,
+                one_bin_in,
                 ..Settings::DEFAULT
             }))
         };
