@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p gonia-brdf --bench growth` runs each row in a process of its own, which tells its
 //! peak of memory from when the samples are there; `-- --fine` adds the grid of 1°, row by row and
-//! without writing it (a quarter of a CPU-hour).
+//! without writing it (some three CPU-minutes).
 
 #![allow(clippy::expect_used)]
 
