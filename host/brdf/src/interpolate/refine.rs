@@ -213,6 +213,7 @@ impl Refiner {
         };
         let most = most.max(f32::MIN_POSITIVE);
         let doubt = self.doubt_between(levels, settings, a, b);
+        // In proportion to the change, parts that bend without much change would be passed over.
         self.doubts
             .iter_mut()
             .for_each(|d| *d = doubt * (*d / most).sqrt());
