@@ -20,7 +20,7 @@ const LOCK: &str = "lock";
 #[derive(Debug)]
 pub struct Claim {
     folder: PathBuf,
-    lock: File,
+    lock: Lock,
 }
 
 /// What a session begins with.
@@ -82,7 +82,7 @@ pub struct SessionWriter {
     frames: File,
     /// Where the next frame begins.
     at: u64,
-    _lock: File,
+    _lock: Lock,
 }
 
 impl SessionWriter {
@@ -101,7 +101,7 @@ impl SessionWriter {
         Ok((Self::open(folder, lock, Some(&session))?, session))
     }
 
-    fn open(folder: &Path, lock: File, session: Option<&SessionFolder>) -> Result<Self, FileError> {
+    fn open(folder: &Path, lock: Lock, session: Option<&SessionFolder>) -> Result<Self, FileError> {
         let journal = Journal::append_to(&folder.join(JOURNAL), session.map(|s| &s.lines))?;
         let path = folder.join(FRAMES);
         let failed = |error| FileError::writing(&path, &error);
@@ -202,7 +202,19 @@ fn check_fresh(folder: &Path, beside: Option<&str>) -> Result<(), FileError> {
     Ok(())
 }
 
-fn lock(folder: &Path) -> Result<File, FileError> {
+/// Holds a session's folder.
+#[derive(Debug)]
+struct Lock(File);
+
+impl Drop for Lock {
+    /// A program that is just being started (the camera's command, say) has this file too until it runs,
+    /// and would hold the folder for as long; unlocking frees it at once.
+    fn drop(&mut self) {
+        let _ = self.0.unlock();
+    }
+}
+
+fn lock(folder: &Path) -> Result<Lock, FileError> {
     let path = folder.join(LOCK);
     let failed = |error| FileError::writing(&path, &error);
     let mut options = OpenOptions::new();
@@ -213,7 +225,7 @@ fn lock(folder: &Path) -> Result<File, FileError> {
         .open(&path)
         .map_err(failed)?;
     match file.try_lock() {
-        Ok(()) => Ok(file),
+        Ok(()) => Ok(Lock(file)),
         Err(std::fs::TryLockError::WouldBlock) => Err(FileError::new(
             folder,
             "is in use by another capture",
@@ -306,10 +318,12 @@ pub(super) mod tests {
         let writer = begin(folder.path());
         let error = SessionWriter::resume(folder.path()).unwrap_err();
         assert!(error.to_string().contains("in use by another capture"));
+        let of_a_child = writer._lock.0.try_clone().unwrap();
         drop(writer);
         assert!(SessionWriter::resume(folder.path()).is_ok());
         let error = Claim::new(folder.path(), None).unwrap_err();
         assert!(error.to_string().contains("holds a session already"));
+        drop(of_a_child);
     }
 
     #[test]
