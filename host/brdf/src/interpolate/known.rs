@@ -17,6 +17,7 @@ pub struct Known<'a> {
     bins: &'a Bins,
     levels: Levels,
     coordinates: Coordinates,
+    one_bin_in: usize,
 }
 
 /// Fewer bins than this are few.
@@ -41,6 +42,7 @@ impl<'a> Known<'a> {
             bins,
             levels: Levels::with_mirror_images(nodes, one_in),
             coordinates,
+            one_bin_in: one_in,
         }
     }
 
@@ -53,6 +55,11 @@ impl<'a> Known<'a> {
     /// The bins.
     pub fn bins(&self) -> &'a Bins {
         self.bins
+    }
+
+    /// Of how many bins one is looked at.
+    pub fn one_bin_in(&self) -> usize {
+        self.one_bin_in
     }
 
     /// The nodes as they were sorted.

@@ -3,8 +3,8 @@
 //!
 //! The coarse block goes through merged nodes. Where its values change most, its own variance is
 //! looked at; if that is more than what noise explains, one fine block is fitted there through the
-//! bins' own nodes. By how much the two differ there, the other parts are doubted in proportion to
-//! how much their values change; parts that are doubted beyond the tolerance get a block of their own,
+//! bins' own nodes. By how much the two differ there, the other parts are doubted by the root of
+//! their share in that change; parts that are doubted beyond the tolerance get a block of their own,
 //! the others keep the coarse one, and all are blended.
 
 use super::Settings;

@@ -53,7 +53,10 @@ pub struct Selection {
 /// its coordinates. The tolerance is raised where cutting would cost more than the budget.
 pub fn select(known: &Known, base: Settings) -> Selection {
     let bins = known.bins();
-    let mut settings = base;
+    let mut settings = Settings {
+        one_bin_in: known.one_bin_in(),
+        ..base
+    };
     let stride = (bins.bins().len() / NOISE_BINS).max(1) | 1;
     if let Some(variance) = log_noise_variance(bins.bins().iter().step_by(stride)) {
         settings.noise_variance = variance;
