@@ -4,6 +4,7 @@
 //! `cargo bench -p gonia-brdf --bench block`
 
 use gonia_brdf::interpolate::block::{BlockSettings, BlockSolver};
+use gonia_brdf::interpolate::coordinates::Trend;
 use gonia_brdf::interpolate::nodes::Node;
 use std::time::Instant;
 
@@ -12,6 +13,7 @@ fn main() {
         range: 8.0,
         noise_variance: 1e-4,
         nugget_min: 1e-4,
+        trend: Trend::NONE,
     };
     println!("nodes  fit us  evaluate 256 us");
     for n in [32, 64, 128, 256] {

@@ -36,7 +36,7 @@ fn main() {
         .collect();
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
     println!(
-        "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior   all  void  settings"
+        "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior grazing  all  void  settings"
     );
     for name in if asked.is_empty() {
         names.to_vec()
@@ -114,9 +114,10 @@ fn main() {
         let rms =
             |keep: &(dyn Fn(f64, f64) -> bool + Sync)| log_rms(&dense, &*model, &measured, keep);
         println!(
-            "{name:<9} {count:>9} {:>8} {bin_s:>6.2} {sort_s:>11.1} {select_s:>13.1} {fill_cpu:>11.1} {fill_s:>7.1} {:>9.4} {:>5.3} {:>5.3}  {}",
+            "{name:<9} {count:>9} {:>8} {bin_s:>6.2} {sort_s:>11.1} {select_s:>13.1} {fill_cpu:>11.1} {fill_s:>7.1} {:>9.4} {:>7.4} {:>5.3} {:>5.3}  {}",
             bins.bins().len(),
             rms(&|i, v| i <= 75.0 && v <= 75.0),
+            rms(&|i, v| i.max(v) > 75.0 && i.min(v) <= 78.0),
             rms(&|_, _| true),
             rms(&|i, v| i > 78.0 && v > 78.0),
             selection.settings,

@@ -6,7 +6,7 @@
 //! all channels.
 
 use super::cholesky::{Columns, PANEL};
-use super::coordinates::Point;
+use super::coordinates::{Point, Trend, distance2};
 use super::nodes::Node;
 use pulp::{Arch, Simd, WithSimd};
 use std::borrow::Borrow;
@@ -20,6 +20,8 @@ pub struct BlockSettings {
     pub noise_variance: f32,
     /// Smallest nugget (noise over signal variance): single precision needs one.
     pub nugget_min: f32,
+    /// The process is that of the logarithms less this.
+    pub trend: Trend,
 }
 
 /// The widest vectors in use hold 16 numbers; buffers are padded to it.
@@ -57,6 +59,13 @@ pub struct BlockSolver {
     columns: Vec<f32>,
     /// √3 over the range.
     scale: f32,
+    trend: Trend,
+    /// The trend at the nodes less that in the middle.
+    trends: Vec<f32>,
+    /// Variance of the trend's slope over that of the process.
+    slope_variance: f32,
+    /// By how much the slope is off, channel by channel.
+    slopes: [f32; 3],
     arch: Arch,
 }
 
@@ -75,6 +84,7 @@ impl BlockSolver {
         let n = nodes.len();
         let padded = n.next_multiple_of(PAD);
         self.middle = middle;
+        self.trend = settings.trend;
         self.scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
         self.load(nodes, padded);
         self.limits = [0, 1, 2].map(|c| limits_of(&self.log_values[c][..n]));
@@ -120,6 +130,55 @@ impl BlockSolver {
         });
     }
 
+    /// Variance of the mean of the fitted process over some places, as [`Self::variances_at`] has it for each.
+    pub fn variance_of_mean(&mut self, places: &[Point]) -> [f32; 3] {
+        if !self.factored || places.is_empty() {
+            return self.signal;
+        }
+        let share = 1.0 / places.len() as f32;
+        let in_middle = self.trend.at(&self.middle);
+        let trend = share
+            * places
+                .iter()
+                .map(|p| self.trend.at(p) - in_middle)
+                .sum::<f32>();
+        let scaled: Vec<Point> = places
+            .iter()
+            .map(|p| std::array::from_fn(|k| (p[k] - self.middle[k]) * self.scale))
+            .collect();
+        let correlation = |a: &Point, b: &Point| {
+            let s = distance2(a, b).sqrt();
+            (1.0 + s) * (-s).exp()
+        };
+        let mut own = self.slope_variance * trend * trend;
+        for a in &scaled {
+            for b in &scaled {
+                own += share * share * correlation(a, b);
+            }
+        }
+        let mut u: Vec<f32> = (0..self.n)
+            .map(|j| {
+                let node: Point = std::array::from_fn(|k| self.axes[k][j]);
+                let sum: f32 = scaled.iter().map(|p| correlation(p, &node)).sum();
+                share * sum + self.slope_variance * self.trends[j] * trend
+            })
+            .collect();
+        let ones = self.norms.len() + 3;
+        let (mut uu, mut zu, mut zz) = (0.0f32, 0.0f32, 0.0f32);
+        for j in 0..self.n {
+            let column = self.matrix.column(j);
+            let x = u[j] / column[j];
+            uu += x * x;
+            zu += x * column[ones];
+            zz += column[ones] * column[ones];
+            for (entry, l) in u[j + 1..].iter_mut().zip(&column[j + 1..self.n]) {
+                *entry -= x * l;
+            }
+        }
+        let kriging = (own - uu).max(0.0) + (1.0 - zu).powi(2) / zz.max(1e-12);
+        self.signal.map(|signal| signal * kriging)
+    }
+
     /// Evaluates the fitted process at places; appends the logarithm per channel, which stays near the
     /// nodes' range: beyond them the process is no more than a guess, and must not run away.
     pub fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; 3]>) {
@@ -136,11 +195,12 @@ impl BlockSolver {
             .iter_mut()
             .chain(&mut self.log_values)
             .chain(&mut self.weights)
-            .chain([&mut self.counts, &mut self.norms])
+            .chain([&mut self.counts, &mut self.norms, &mut self.trends])
         {
             buffer.clear();
             buffer.resize(padded, 0.0);
         }
+        let in_middle = self.trend.at(&self.middle);
         for (row, node) in nodes.enumerate() {
             let node = node.borrow();
             for k in 0..6 {
@@ -148,8 +208,10 @@ impl BlockSolver {
                 self.axes[k][row] = x;
                 self.norms[row] += x * x;
             }
+            let trend = self.trend.at(&node.point);
+            self.trends[row] = trend - in_middle;
             for c in 0..3 {
-                self.log_values[c][row] = node.log_value[c];
+                self.log_values[c][row] = node.log_value[c] - trend;
             }
             self.counts[row] = node.count;
         }
@@ -159,6 +221,7 @@ impl BlockSolver {
         for c in 0..3 {
             self.mean[c] = self.log_values[c].iter().sum::<f32>() / n.max(1) as f32;
             self.weights[c].fill(0.0);
+            self.slopes[c] = 0.0;
             let squares = self.log_values[c][..n]
                 .iter()
                 .map(|v| (v - self.mean[c]).powi(2));
@@ -213,6 +276,7 @@ impl WithSimd for Fit<'_> {
         for j in 0..n {
             s.matrix.column_mut(j)[j] = 1.0 + nugget / s.counts[j].max(COUNT_MIN);
         }
+        s.add_slope(signal, n);
         if !s.matrix.factor(simd, padded) {
             return Err(nugget);
         }
@@ -275,6 +339,24 @@ impl BlockSolver {
         }
         let squares = simd.reduce_sum_f32s(square) + n as f32;
         simd.reduce_sum_f32s(below) - 0.5 * squares - surplus
+    }
+
+    /// Adds what the nodes share by their trend, whose slope differs from block to block.
+    fn add_slope(&mut self, signal: f32, n: usize) {
+        let largest = self.trends.iter().fold(0.0f32, |m, t| m.max(t * t));
+        let spread = SLOPE_SPREAD * SLOPE_SPREAD / signal;
+        self.slope_variance = spread.min(SLOPE_MAX / largest.max(f32::MIN_POSITIVE));
+        if self.slope_variance * largest < SLOPE_MIN {
+            self.slope_variance = 0.0;
+            return;
+        }
+        for j in 0..n {
+            let factor = self.slope_variance * self.trends[j];
+            let column = &mut self.matrix.column_mut(j)[j..n];
+            for (entry, trend) in column.iter_mut().zip(&self.trends[j..n]) {
+                *entry += factor * trend;
+            }
+        }
     }
 
     /// Variance of the nodes' values, mean over the channels, and the share of it that is noise.
@@ -356,8 +438,21 @@ impl BlockSolver {
                 }
             }
         }
+        for c in 0..3 {
+            let pairs = self.weights[c].iter().zip(&self.trends);
+            self.slopes[c] = self.slope_variance * pairs.map(|(w, t)| w * t).sum::<f32>();
+        }
     }
 }
+
+/// Standard deviation of the trend's slope from block to block: it is 0 where a base makes the value, and
+/// some 1 in a lobe.
+const SLOPE_SPREAD: f32 = 0.5;
+/// The variance that the slope makes, over that of the process, is at most this (single precision bears no
+/// more, and the slope is as free as it would be with more) …
+const SLOPE_MAX: f32 = 4.0;
+/// … and below this left out.
+const SLOPE_MIN: f32 = 1e-3;
 
 struct Evaluate<'a> {
     solver: &'a BlockSolver,
@@ -377,6 +472,7 @@ impl WithSimd for Evaluate<'_> {
             S::as_simd_f32s(&s.weights[1]).0,
             S::as_simd_f32s(&s.weights[2]).0,
         ];
+        let in_middle = s.trend.at(&s.middle);
         for point in self.places {
             let mut place = Place::<S>::at_origin(simd);
             for k in 0..6 {
@@ -400,11 +496,13 @@ impl WithSimd for Evaluate<'_> {
                 }
                 r += 1;
             }
+            let trend = s.trend.at(point);
+            let from_middle = trend - in_middle;
             let mut result = s.mean;
             for c in 0..3 {
-                result[c] += simd.reduce_sum_f32s(sums[c]);
+                result[c] += simd.reduce_sum_f32s(sums[c]) + from_middle * s.slopes[c];
                 let (low, high) = s.limits[c];
-                result[c] = result[c].max(low).min(high);
+                result[c] = result[c].max(low).min(high) + trend;
             }
             self.out.push(result);
         }
@@ -433,10 +531,12 @@ impl WithSimd for Variance<'_> {
         }
         s.columns.resize(n * lanes, 0.0);
         // Coordinates of the places, axis by axis, and their squared lengths, in seven vectors.
-        let mut buffer = [0.0f32; 7 * PAD];
+        let mut buffer = [0.0f32; 8 * PAD];
+        let in_middle = s.trend.at(&s.middle);
         for places in self.places.chunks(lanes) {
             buffer.fill(0.0);
             for (lane, point) in places.iter().enumerate() {
+                buffer[7 * lanes + lane] = s.trend.at(point) - in_middle;
                 for k in 0..6 {
                     let x = (point[k] - s.middle[k]) * s.scale;
                     buffer[k * lanes + lane] = x;
@@ -461,7 +561,9 @@ impl WithSimd for Variance<'_> {
                 for k in 0..6 {
                     node.set(simd, k, s.axes[k][j]);
                 }
-                u[j] = kernel::<S, 1>(simd, &node, &axes, 0)[0];
+                let slope = simd.splat_f32s(s.slope_variance * s.trends[j]);
+                let [k] = kernel::<S, 1>(simd, &node, &axes, 0);
+                u[j] = simd.mul_add_e_f32s(slope, vectors[7], k);
             }
             let mut uu = simd.splat_f32s(0.0);
             let mut zu = simd.splat_f32s(0.0);
@@ -483,7 +585,8 @@ impl WithSimd for Variance<'_> {
             }
             for lane in 0..places.len() {
                 let (uu, zu) = (out[lane], out[lanes + lane]);
-                let kriging = (1.0 - uu).max(0.0) + (1.0 - zu).powi(2) / zz.max(1e-12);
+                let own = 1.0 + s.slope_variance * buffer[7 * lanes + lane].powi(2);
+                let kriging = (own - uu).max(0.0) + (1.0 - zu).powi(2) / zz.max(1e-12);
                 let mut variance = s.signal;
                 for c in 0..3 {
                     variance[c] *= kriging;
@@ -673,6 +776,7 @@ mod tests {
         range: 8.0,
         noise_variance: 1e-6,
         nugget_min: 1e-4,
+        trend: Trend::NONE,
     };
 
     fn node(x: f32, y: f32, count: f32) -> Node {

@@ -8,7 +8,7 @@
 //! included. Where that noise hides the error of the guess, the factor stays near the usual one.
 
 use super::Settings;
-use super::hold_out::{HoldOut, Prediction};
+use super::hold_out::{HoldOut, Mean, Prediction};
 use super::known::Known;
 use super::nodes::SIGMA_PER_MAD;
 use crate::bins::{Bin, Bins};
@@ -32,9 +32,8 @@ const CLASS_MIN: usize = 100;
 const CLASS_SPAN: f32 = 2.0;
 /// Elevations above this are a class of their own: views end there, degrees.
 const GRAZING_DEG: f64 = 75.0;
-/// What most materials need for a factor where noise alone makes the error: their values are smoother
-/// than the kernel takes them for (docs/results.md) …
-const USUAL_FACTOR: f32 = 0.9;
+/// The factor where noise alone makes the error: what the block itself says …
+const USUAL_FACTOR: f32 = 1.0;
 /// … give or take this share of its square.
 const USUAL_SPREAD: f32 = 0.5;
 /// Standard deviation of a 95th percentile of squares of normal values over their 95th percentile,
@@ -114,36 +113,37 @@ impl Calibration {
     /// to hold any out.
     pub fn new(known: &Known, settings: &Settings) -> Option<Self> {
         let sets = HoldOut::sets(known.bins());
-        let mut predictions = Vec::new();
+        let mut means = Vec::new();
         for set in 0..sets {
             let set = ONE_IN - 1 - set;
             if let Some(held_out) = HoldOut::new(known, set, ONE_IN, TESTS / sets as usize) {
-                predictions.extend(held_out.predict(settings));
+                means.extend(held_out.predict_means(settings));
             }
         }
         let noise_variance = settings.noise_variance;
-        (!predictions.is_empty()).then(|| Self::from_predictions(&predictions, noise_variance))
+        (!means.is_empty()).then(|| Self::from_means(&means, noise_variance))
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.
-    pub fn from_predictions(predictions: &[Prediction], noise_variance: f32) -> Self {
-        let mut logs: Vec<f32> = predictions.iter().map(|p| mean(p.log)).collect();
+    fn from_means(means: &[Mean], noise_variance: f32) -> Self {
+        let mut logs: Vec<f32> = means.iter().map(|m| mean(m.first.log)).collect();
         logs.sort_by(f32::total_cmp);
         // The brightest tenth of all is about half of the bins that a hold-out picks.
         let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
-        let noise = BinNoise::new(predictions, noise_variance);
+        let noise = BinNoise::new(means, noise_variance);
         let mut calibration = Self {
             parts: [(); 4].map(|()| Classes::new(&[], &noise)),
             bright,
             noise,
         };
-        let all: Vec<&Prediction> = predictions.iter().collect();
+        let all: Vec<&Mean> = means.iter().collect();
         for part in 0..4 {
-            let of_part = |p: &&Prediction| {
-                let (light, view) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
-                calibration.part(light, view, p.log) == part
+            let of_part = |m: &&Mean| {
+                let bin = m.first.bin;
+                let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
+                calibration.part(light, view, m.first.log) == part
             };
-            let own: Vec<&Prediction> = all.iter().copied().filter(of_part).collect();
+            let own: Vec<&Mean> = all.iter().copied().filter(of_part).collect();
             let enough = own.len() >= CLASS_MIN;
             calibration.parts[part] = Classes::new(if enough { &own } else { &all }, &noise);
         }
@@ -183,12 +183,19 @@ impl Calibration {
 
 impl BinNoise {
     /// Finds the factor on bins that tell of noise alone; without enough of them it is 1.
-    fn new(predictions: &[Prediction], variance: f32) -> Self {
+    fn new(means: &[Mean], variance: f32) -> Self {
         let stated = Self {
             variance,
             factor: 1.0,
         };
-        let mut factors: Vec<f32> = residuals(predictions.iter(), &stated)
+        let mut factors: Vec<f32> = means
+            .iter()
+            .flat_map(|m| {
+                let p = m.first;
+                (0..3).filter_map(move |c| {
+                    Residual::new(p.residual(c), p.variance[c], stated.of(p.bin, c))
+                })
+            })
             .map(|r| (r.noise, USUAL_FACTOR.powi(2) * r.variance, r.limit))
             .filter(|(noise, error, _)| *error < NOISE_ALONE * noise)
             .map(|(noise, error, limit)| (limit - error) / noise)
@@ -238,42 +245,55 @@ struct Residual {
     noise: f32,
 }
 
-fn residuals<'a>(
-    predictions: impl Iterator<Item = &'a Prediction<'a>>,
-    noise: &BinNoise,
-) -> impl Iterator<Item = Residual> {
-    predictions.flat_map(|p| {
-        (0..3).filter_map(|c| {
-            Some(Residual {
-                limit: (p.residual(c)? / Z95).powi(2),
-                variance: p.variance[c].max(1e-12),
-                noise: noise.of(p.bin, c),
-            })
+impl Residual {
+    fn new(residual: Option<f32>, variance: f32, noise: f32) -> Option<Self> {
+        Some(Self {
+            limit: (residual? / Z95).powi(2),
+            variance: variance.max(1e-12),
+            noise,
         })
-    })
+    }
+
+    /// Those of the channels of a mean.
+    fn of_mean<'a>(mean: &'a Mean, noise: &'a BinNoise) -> impl Iterator<Item = Self> + 'a {
+        let count = mean.bins.len() as f32;
+        (0..3).filter_map(move |c| {
+            let sum: f32 = mean.bins.iter().map(|bin| noise.of(bin, c)).sum();
+            Self::new(mean.residual[c], mean.variance[c], sum / (count * count))
+        })
+    }
 }
 
 impl Classes {
-    fn new(predictions: &[&Prediction], noise: &BinNoise) -> Self {
-        let mut sorted: Vec<&Prediction> = predictions.to_vec();
-        sorted.sort_by(|a, b| size(a.variance).total_cmp(&size(b.variance)));
+    fn new(means: &[&Mean], noise: &BinNoise) -> Self {
+        let size = |m: &Mean| size(m.first.variance);
+        let mut sorted: Vec<&Mean> = means.to_vec();
+        sorted.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let length = sorted.len().div_ceil(SIZES).max(CLASS_MIN);
         let mut limits = Vec::new();
         let mut factors = Vec::new();
         let mut rest = &sorted[..];
         while let Some(first) = rest.first() {
-            let within = CLASS_SPAN * size(first.variance);
-            let near = rest.partition_point(|p| size(p.variance) <= within);
+            let within = CLASS_SPAN * size(first);
+            let near = rest.partition_point(|m| size(m) <= within);
             let mut n = near.clamp(CLASS_MIN, length).min(rest.len());
             if rest.len() - n < CLASS_MIN {
                 n = rest.len();
             }
             let (class, others) = rest.split_at(n);
-            limits.extend(class.last().map(|last| size(last.variance)));
+            limits.extend(class.last().map(|last| size(last)));
             factors.push(factor_of(class, noise));
             rest = others;
         }
         limits.pop();
+        // Errors of a frame come together, so that few frames make a class: what its neighbours say
+        // steadies it.
+        let squares = factors.clone();
+        let square = |k: usize| squares[k.min(squares.len() - 1)].powi(2);
+        for (k, factor) in factors.iter_mut().enumerate() {
+            let around = square(k.saturating_sub(1)) + 2.0 * square(k) + square(k + 1);
+            *factor = (0.25 * around).sqrt();
+        }
         if factors.is_empty() {
             factors.push(USUAL_FACTOR);
         }
@@ -290,8 +310,11 @@ impl Classes {
 /// square of the factor that just reaches it, and of these the 95th percentile; then the mean of that
 /// and of the usual one, each weighted by how sure it is. Of residuals that are nearly all noise, the
 /// percentile tells nothing.
-fn factor_of(class: &[&Prediction], noise: &BinNoise) -> f32 {
-    let all: Vec<Residual> = residuals(class.iter().copied(), noise).collect();
+fn factor_of(class: &[&Mean], noise: &BinNoise) -> f32 {
+    let all: Vec<Residual> = class
+        .iter()
+        .flat_map(|mean| Residual::of_mean(mean, noise))
+        .collect();
     let mut squares: Vec<f32> = all
         .iter()
         .map(|r| (r.limit - r.noise) / r.variance)

@@ -9,7 +9,7 @@ use super::known::{Known, MANY_BINS};
 use super::patches::{Patch, cover};
 use super::refine::Refiner;
 use crate::bins::{Bin, Bins};
-use crate::direction::Direction;
+use crate::direction::{Direction, Vec3};
 use crate::grid::Grid;
 use crate::sample::Sample;
 use rayon::prelude::*;
@@ -19,6 +19,8 @@ const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
+/// Held-out bins of a frame in one block that are averaged, at most.
+const MATES: usize = 64;
 /// Sets of frames to hold out in turn, where there are few bins: one would decide by chance, and several
 /// are cheap then.
 const SETS: u32 = 4;
@@ -28,6 +30,10 @@ pub struct HoldOut<'a> {
     known: &'a Known<'a>,
     /// Of each bin, whether it is known.
     training: Vec<bool>,
+    /// All that are held out.
+    left_out: Vec<&'a Bin>,
+    /// Whether frames are held out, not clusters.
+    framed: bool,
     /// Bins that are to be predicted, each with the number of held-out bins it stands for.
     tests: Vec<(&'a Bin, f32)>,
 }
@@ -48,9 +54,22 @@ pub struct Prediction<'a> {
 impl Prediction<'_> {
     /// Logarithm of predicted over measured, of channels that can have one.
     pub fn residual(&self, channel: usize) -> Option<f32> {
-        let median = self.bin.median[channel];
-        (median > 0.0).then(|| self.log[channel] - median.ln())
+        residual(self.bin, self.log, channel)
     }
+}
+
+/// What the others make of the held-out bins of one frame (or cluster) in one block. Their mean tells of
+/// errors that noise hides from each of them.
+#[derive(Clone, Debug)]
+pub struct Mean<'a> {
+    /// One of them.
+    pub first: Prediction<'a>,
+    /// All of them.
+    pub bins: Vec<&'a Bin>,
+    /// Mean logarithm of predicted over measured, of channels that can have one.
+    pub residual: [Option<f32>; 3],
+    /// Variance of the mean of the predictions, per channel, not calibrated.
+    pub variance: [f32; 3],
 }
 
 impl<'a> HoldOut<'a> {
@@ -61,8 +80,9 @@ impl<'a> HoldOut<'a> {
         let bins = known.bins().bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
         let held_out = |bin: &Bin| {
-            let group = if framed { bin.frame } else { cluster(bin) };
-            hash(group).wrapping_add(set).is_multiple_of(one_in)
+            hash(group_of(bin, framed))
+                .wrapping_add(set)
+                .is_multiple_of(one_in)
         };
         // Bins of several frames may hold a part of a held-out frame, so none of them takes part.
         let takes_part = |bin: &Bin| !framed || bin.frame != Sample::NO_FRAME;
@@ -70,15 +90,17 @@ impl<'a> HoldOut<'a> {
             .iter()
             .map(|bin| takes_part(bin) && !held_out(bin))
             .collect();
-        let candidates = bins
+        let left_out: Vec<&Bin> = bins
             .iter()
             .filter(|bin| takes_part(bin) && held_out(bin))
             .collect();
-        let tests = pick(candidates, tests);
+        let tests = pick(left_out.clone(), tests);
         let trained = training.iter().filter(|known| **known).count();
         (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
             known,
             training,
+            left_out,
+            framed,
             tests,
         })
     }
@@ -94,6 +116,38 @@ impl<'a> HoldOut<'a> {
 
     /// Predicts the tests, by the very blocks that a fill with these settings would use.
     pub fn predict(&self, settings: &Settings) -> Vec<Prediction<'a>> {
+        let means = self.predict_among(settings, |_| &[]);
+        means.into_iter().map(|mean| mean.first).collect()
+    }
+
+    /// Predicts the tests together with the other held-out bins of their frames (or clusters) in the same block.
+    pub fn predict_means(&self, settings: &Settings) -> Vec<Mean<'a>> {
+        let grid = self.known.bins().grid();
+        let patches = cover(grid, &settings.patch_sizes_deg()).patches;
+        let patch_of = patch_of_direction(grid, &patches);
+        let key = |bin: &Bin| {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            (group_of(bin, self.framed), patch_of[light], patch_of[view])
+        };
+        let mut sorted: Vec<_> = self.left_out.iter().map(|bin| (key(bin), *bin)).collect();
+        sorted.sort_by_key(|(key, bin)| (*key, bin.cell));
+        let (keys, bins): (Vec<_>, Vec<&Bin>) = sorted.into_iter().unzip();
+        self.predict_among(settings, |bin| {
+            let key = key(bin);
+            let from = keys.partition_point(|k| *k < key);
+            let to = keys.partition_point(|k| *k <= key);
+            &bins[from..to]
+        })
+    }
+
+    fn predict_among<'b>(
+        &self,
+        settings: &Settings,
+        mates: impl Fn(&Bin) -> &'b [&'a Bin] + Sync,
+    ) -> Vec<Mean<'a>>
+    where
+        'a: 'b,
+    {
         let grid = self.known.bins().grid();
         let sorted = self.known.sorted_for(settings.coordinates);
         let nodes = sorted
@@ -102,22 +156,71 @@ impl<'a> HoldOut<'a> {
             .part(settings.coordinates, |bin| self.training[bin]);
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);
+        let work = || (Refiner::default(), Vec::new());
         self.tests
             .par_iter()
-            .map_init(Refiner::default, |refiner, (bin, weight)| {
+            .map_init(work, |(refiner, members), (bin, weight)| {
                 let (light, view) = grid.light_and_view(bin.cell as usize);
                 let (p, q) = (&patches[patch_of[light]], &patches[patch_of[view]]);
-                let place = (bin.light.map(f64::from), bin.view.map(f64::from));
-                let (log, variance) = refiner.predict(&nodes, settings, (p, q), place);
-                Prediction {
-                    bin,
-                    weight: *weight,
-                    log,
-                    variance,
+                let mates = mates(bin);
+                let step = mates.len().div_ceil(MATES).max(1);
+                let others = mates.iter().step_by(step);
+                let others = others.filter(|mate| mate.cell != bin.cell).copied();
+                members.clear();
+                members.extend(std::iter::once(*bin).chain(others).map(Member::of));
+                let predicted = refiner.predict(&nodes, settings, (p, q), members);
+                let mut mean = Mean {
+                    first: Prediction {
+                        bin,
+                        weight: *weight,
+                        log: predicted.logs[0],
+                        variance: predicted.variance,
+                    },
+                    bins: members.iter().map(|m| m.bin).collect(),
+                    residual: [Some(0.0); 3],
+                    variance: predicted.variance_of_mean,
+                };
+                let share = 1.0 / members.len() as f32;
+                for (member, log) in members.iter().zip(predicted.logs) {
+                    for c in 0..3 {
+                        let own = residual(member.bin, *log, c);
+                        mean.residual[c] = mean.residual[c].zip(own).map(|(m, r)| m + share * r);
+                    }
                 }
+                mean
             })
             .collect()
     }
+}
+
+/// A bin and its place.
+struct Member<'a> {
+    bin: &'a Bin,
+    place: (Vec3, Vec3),
+}
+
+impl<'a> Member<'a> {
+    fn of(bin: &'a Bin) -> Self {
+        let place = (bin.light.map(f64::from), bin.view.map(f64::from));
+        Self { bin, place }
+    }
+}
+
+impl AsRef<(Vec3, Vec3)> for Member<'_> {
+    fn as_ref(&self) -> &(Vec3, Vec3) {
+        &self.place
+    }
+}
+
+/// Logarithm of a prediction over what a bin measured, of channels that can have one.
+fn residual(bin: &Bin, log: [f32; 3], channel: usize) -> Option<f32> {
+    let median = bin.median[channel];
+    (median > 0.0).then(|| log[channel] - median.ln())
+}
+
+/// Number of the frame or the cluster that a bin is held out with.
+fn group_of(bin: &Bin, framed: bool) -> u32 {
+    if framed { bin.frame } else { cluster(bin) }
 }
 
 /// Picks about `n` bins, half of them among the brightest tenth.

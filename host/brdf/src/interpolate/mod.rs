@@ -135,6 +135,7 @@ impl Settings {
             range: self.range,
             noise_variance: self.noise_variance,
             nugget_min: self.nugget_min,
+            trend: self.coordinates.trend(),
         }
     }
 }

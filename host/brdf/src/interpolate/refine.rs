@@ -60,6 +60,19 @@ pub struct Refiner {
     pub count: Count,
 }
 
+/// What a block makes of some places.
+pub struct Predicted<'a> {
+    /// Natural logarithms.
+    pub logs: &'a [[f32; 3]],
+    /// Variance of the first.
+    pub variance: [f32; 3],
+    /// Variance of their mean.
+    pub variance_of_mean: [f32; 3],
+}
+
+/// So many places, about, tell the variance of the mean of more.
+const MEAN_OF: usize = 8;
+
 /// Numbers of blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
@@ -302,15 +315,16 @@ impl Refiner {
         &self.variances
     }
 
-    /// The natural logarithm at one place of a pair, and its variance, each per channel: what
-    /// [`Self::solve`] would give for a cell there.
+    /// The natural logarithms at places of a pair: what [`Self::solve`] would give for cells there. The
+    /// block is that of the first of them; of the others those are kept that it serves for too.
+    /// Variances are not calibrated.
     pub fn predict(
         &mut self,
         levels: &impl Neighbours,
         settings: &Settings,
         (p, q): (&Patch, &Patch),
-        (light, view): (Vec3, Vec3),
-    ) -> ([f32; 3], [f32; 3]) {
+        places: &mut Vec<impl AsRef<(Vec3, Vec3)>>,
+    ) -> Predicted<'_> {
         self.fit_whole(levels, settings, p, q);
         let cut = self.is_to_be_cut(levels, settings, p, q);
         let nearest = |patch: &'_ Patch, direction: Vec3| {
@@ -318,23 +332,51 @@ impl Refiner {
             let parts = 0..patch.children.len();
             parts.max_by(|a, b| along(&patch.children[*a]).total_cmp(&along(&patch.children[*b])))
         };
-        let block = match (nearest(p, light), nearest(q, view)) {
-            (Some(a), Some(b))
-                if cut && self.is_part_doubted(settings, a * q.children.len() + b) =>
-            {
+        let part_of = |(light, view): (Vec3, Vec3)| {
+            Some(nearest(p, light)? * q.children.len() + nearest(q, view)?)
+        };
+        let doubted = |number: Option<usize>| {
+            cut && number.is_some_and(|number| self.is_part_doubted(settings, number))
+        };
+        let first = places.first().and_then(|place| part_of(*place.as_ref()));
+        let is_fine = doubted(first);
+        places.retain(|place| {
+            let part = part_of(*place.as_ref());
+            if is_fine {
+                part == first
+            } else {
+                !doubted(part)
+            }
+        });
+        let block = match first {
+            Some(number) if is_fine => {
+                let (a, b) = (number / q.children.len(), number % q.children.len());
                 let centre = (p.children[a].patch.centre, q.children[b].patch.centre);
                 self.fit_part(levels, settings, centre.0, centre.1);
                 &mut self.fine
             }
             _ => &mut self.whole,
         };
-        let place = [settings.coordinates.point(light, view)];
+        self.places.clear();
+        let points = places.iter().map(|place| {
+            let (light, view) = place.as_ref();
+            settings.coordinates.point(*light, *view)
+        });
+        self.places.extend(points);
         self.part.clear();
-        block.evaluate(&place, &mut self.part);
-        let log = self.part[0];
-        self.part.clear();
-        block.variances_at(&place, &mut self.part);
-        (log, self.part[0])
+        block.evaluate(&self.places, &mut self.part);
+        self.part_variances.clear();
+        block.variances_at(
+            &self.places[..1.min(places.len())],
+            &mut self.part_variances,
+        );
+        let step = places.len().div_ceil(MEAN_OF).max(1);
+        self.places = self.places.iter().copied().step_by(step).collect();
+        Predicted {
+            logs: &self.part,
+            variance: self.part_variances.first().copied().unwrap_or_default(),
+            variance_of_mean: block.variance_of_mean(&self.places),
+        }
     }
 
     /// A coarse block, through merged nodes, and what it gives at the corners.

@@ -16,9 +16,8 @@ const NOISE_BINS: usize = 300_000;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
 /// The systems of coordinates that compete; of those that are as good as the best, the first.
-const CANDIDATES: [Coordinates; 4] = [
+const CANDIDATES: [Coordinates; 3] = [
     Coordinates::HalfDifference { weight: 0.5 },
-    Coordinates::HalfDifference { weight: 0.25 },
     Coordinates::SumDifference { weight: 0.5 },
     Coordinates::SumDifference { weight: 1.0 },
 ];
