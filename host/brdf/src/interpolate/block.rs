@@ -770,6 +770,7 @@ const _: () = assert!(PAD.is_multiple_of(PANEL));
 
 #[cfg(test)]
 mod tests {
+    use super::super::coordinates::Coordinates;
     use super::*;
 
     const SETTINGS: BlockSettings = BlockSettings {
@@ -896,6 +897,78 @@ mod tests {
                 let off = f64::from(got[c] / solver.signal[c]) - kriging;
                 assert!(off.abs() < 2e-5 + 0.02 * kriging, "{off} {kriging}");
             }
+        }
+    }
+
+    /// Nodes along the second half's first axis, whose values follow the trend of half/difference
+    /// coordinates so many times.
+    fn along_the_trend(times: f32) -> (BlockSettings, Vec<Node>) {
+        let trend = Coordinates::HalfDifference { weight: 0.5 }.trend();
+        let settings = BlockSettings { trend, ..SETTINGS };
+        let nodes = (0..60)
+            .map(|k| {
+                let mut node = node(0.002 * (k % 7) as f32, 0.0, 1.0);
+                node.point[3] = 0.4 + 0.004 * k as f32;
+                node.log_value = [times * trend.at(&node.point); 3];
+                node
+            })
+            .collect();
+        (settings, nodes)
+    }
+
+    #[test]
+    fn a_trend_goes_on_beyond_the_nodes_with_the_slope_that_they_show() {
+        let beyond: Point = [0.0, 0.0, 0.0, 0.68, 0.0, 0.0];
+        let middle: Point = [0.0, 0.0, 0.0, 0.52, 0.0, 0.0];
+        for times in [0.5, 1.0, 1.5] {
+            let (settings, nodes) = along_the_trend(times);
+            let expected = times * settings.trend.at(&beyond);
+            let off = |settings: &BlockSettings| {
+                let mut solver = BlockSolver::default();
+                solver.fit(nodes.iter(), middle, 0.12, settings);
+                (at(&solver, &beyond)[0] - expected).abs()
+            };
+            let (with, without) = (off(&settings), off(&SETTINGS));
+            assert!(
+                with < 0.1 * expected && with < 0.5 * without,
+                "{times}: {with} {without}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_variance_of_a_mean_is_that_of_its_place_and_less_of_several() {
+        let (with_trend, along) = along_the_trend(1.2);
+        let place = |x, y| node(x, y, 1.0).point;
+        let cases = [
+            (SETTINGS, scattered(60), place(0.9, 0.7), place(-0.9, 0.7)),
+            (
+                with_trend,
+                along,
+                [0.0, 0.0, 0.0, 0.68, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 0.36, 0.0, 0.0],
+            ),
+        ];
+        for (settings, nodes, a, b) in cases {
+            let mut solver = BlockSolver::default();
+            solver.fit(nodes.iter(), [0.0; 6], 0.7, &settings);
+            let mut single = Vec::new();
+            solver.variances_at(&[a, b], &mut single);
+            let [of_a, of_b] = [a, b].map(|p| solver.variance_of_mean(&[p])[0]);
+            assert!(
+                (of_a / single[0][0] - 1.0).abs() < 0.03,
+                "{of_a} {single:?}"
+            );
+            assert!(
+                (of_b / single[1][0] - 1.0).abs() < 0.03,
+                "{of_b} {single:?}"
+            );
+            // Far apart they know little of each other's error.
+            let both = solver.variance_of_mean(&[a, b])[0];
+            assert!(
+                both < 0.9 * of_a.max(of_b) && both > 0.0,
+                "{both} {of_a} {of_b}"
+            );
         }
     }
 

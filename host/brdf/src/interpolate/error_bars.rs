@@ -3,9 +3,10 @@
 //! standard error is found in the same way.
 //!
 //! A block's own variance is a guess: it rests on one kernel and on few nodes. How far off it is,
-//! is measured on held-out bins, class by class (elevation, brightness, and size of the guess): each class gets
-//! the factor with which 95 % of its bins lie within 1.96 standard errors, the bins' own noise
-//! included. Where that noise hides the error of the guess, the factor stays near the usual one.
+//! is measured on frames held out, class by class (elevation, brightness, and size of the guess): of the
+//! mean residual of a frame's bins in one block, because noise averages out of it and the block's error
+//! does not. Each class gets the factor with which 95 % of these means lie within 1.96 standard errors, the
+//! bins' own noise included. Where that noise hides the error even so, the block's word stands.
 
 use super::Settings;
 use super::hold_out::{HoldOut, Mean, Prediction};
@@ -19,11 +20,11 @@ use rayon::prelude::*;
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 pub const Z95: f32 = 1.96;
-/// Held-out bins that are predicted, at most.
+/// Means of held-out bins that are looked at, at most.
 const TESTS: usize = 12_000;
 /// One frame in so many is held out.
 const ONE_IN: u32 = 24;
-/// A class by size of the guess holds one in so many of a part of the domain, at most …
+/// A class by size of the guess holds one in so many means of a part of the domain, at most …
 const SIZES: usize = 8;
 /// … and bins at least: fewer cannot tell a 95th percentile …
 const CLASS_MIN: usize = 100;

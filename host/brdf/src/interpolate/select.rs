@@ -129,3 +129,21 @@ fn tie(best: &[f64], other: &[f64]) -> bool {
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_worse_on_many_tests_is_no_tie() {
+        let best: Vec<f64> = (0..1000).map(|k| 1.0 + 0.1 * f64::from(k % 7)).collect();
+        let times = |factor: f64| best.iter().map(|b| factor * b).collect::<Vec<f64>>();
+        assert!(tie(&best, &best) && tie(&best, &times(1.1)));
+        assert!(!tie(&best, &times(1.2)));
+        // A fifth worse too, but by one test, and better by another.
+        let mut by_one = best.clone();
+        by_one[500] += 400.0;
+        by_one[501] -= 140.0;
+        assert!(mean(&by_one) > 1.15 * mean(&best) && tie(&best, &by_one));
+    }
+}
