@@ -95,7 +95,7 @@ impl std::fmt::Display for Coordinates {
 /// What the logarithm of a BRDF rises by towards grazing light and view that face each other, in
 /// half/difference coordinates: `−½ ln cos θd`, θd the angle from the half vector to either. Lobes are
 /// about 1 / cos θd there, bases are flat, and these coordinates see little of it: the half vector hardly moves. Interpolating what is
-/// left takes half to a third off the error where one elevation is beyond 75° and the other beyond 60°
+/// left takes about a quarter off the error of sharp materials where one elevation is beyond 75° and the other beyond 60°
 /// (docs/results.md). Coordinates with the sum of light and view, which is 2 cos θd long, need none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trend {
