@@ -117,7 +117,10 @@ fn a_session_that_is_watched_paused_and_gone_on_with_gives_the_samples_of_one_le
     assert_eq!(ask(address, "POST /resume", &with_token).0, 204);
     state_with(address, "\"frame\":{");
     assert_eq!(ask(address, "POST /pause", &with_token).0, 204);
-    state_with(address, "\"phase\":\"held\"");
+    // In the middle of it: held means that the last shot's frame is kept too.
+    let held = state_with(address, "\"phase\":\"held\"");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(done_of(&state_with(address, "held")), done_of(&held));
     for picture in ["frame", "slice"] {
         let (status, body) = ask(address, &format!("GET /{picture}.png"), &[]);
         assert!(status == 200 && body.contains("PNG"), "{picture}");

@@ -296,6 +296,10 @@ impl Measuring<'_> {
     pub(super) fn obey(&self, shooter: &mut Shooter, accounts: &mut Accounts) -> Result<(), Halt> {
         let orders = self.capture.orders;
         if orders.is_held() {
+            // Held is said when nothing is under way any more: whoever switches the camera off then
+            // loses no frame.
+            accounts.settle()?;
+            accounts.clear_desk()?;
             accounts.event("held by hand");
             accounts.watch.tell(&Told::Held(true));
             let began = Instant::now();

@@ -342,6 +342,7 @@ impl BlockSolver {
     }
 
     /// Adds what the nodes share by their trend, whose slope differs from block to block.
+    #[inline(always)]
     fn add_slope(&mut self, signal: f32, n: usize) {
         let largest = self.trends.iter().fold(0.0f32, |m, t| m.max(t * t));
         let spread = SLOPE_SPREAD * SLOPE_SPREAD / signal;

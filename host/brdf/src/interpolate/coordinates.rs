@@ -113,6 +113,7 @@ impl Trend {
     };
 
     /// The trend at a point.
+    #[inline(always)]
     pub fn at(&self, point: &Point) -> f32 {
         if self.per_difference2 == 0.0 {
             return 0.0;
