@@ -10,6 +10,7 @@ use std::time::Instant;
 
 fn main() {
     let settings = BlockSettings {
+        stretch: 1.0,
         range: 8.0,
         noise_variance: 1e-4,
         nugget_min: 1e-4,

@@ -2,7 +2,7 @@
 //! RMS of ln(f/f_true) over missing cells.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 0.5 | --sum 0.5]`
+//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 1 | --sum 0.5] [--kernel 0.5]`
 
 #![allow(clippy::expect_used)]
 
@@ -66,11 +66,11 @@ fn main() {
         };
         // Coordinates that are given need not be chosen.
         let given = |name: &str| arguments.iter().any(|a| a == name);
-        let weight = option("--half", option("--sum", 0.5));
+        let weight = option("--half", option("--sum", 1.0));
         let fixed = if given("--half") {
-            Some(Coordinates::HalfDifference { weight })
+            Some(Coordinates::half_difference(weight))
         } else if given("--sum") {
-            Some(Coordinates::SumDifference { weight })
+            Some(Coordinates::sum_difference(weight))
         } else {
             None
         };
@@ -83,6 +83,7 @@ fn main() {
             Some(coordinates) => Selection {
                 settings: Settings {
                     coordinates,
+                    kernel_weight: option("--kernel", weight),
                     noise_variance: (plan::NOISE * plan::NOISE) as f32,
                     ..base
                 },
@@ -92,8 +93,9 @@ fn main() {
         let select_s = cpu_seconds() - cpu;
         for trial in &selection.trials {
             println!(
-                "  tried {:<28} log-RMS {:.4}",
+                "  tried {:<28} kernel w={:<4} log-RMS {:.4}",
                 trial.settings.coordinates.to_string(),
+                trial.settings.kernel_weight,
                 trial.log_rms
             );
         }

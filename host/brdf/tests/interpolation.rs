@@ -301,7 +301,7 @@ fn samples_without_frames_are_held_out_by_clusters() {
     samples.iter_mut().for_each(|s| s.frame = Sample::NO_FRAME);
     let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &samples);
     let known = Known::new(&bins);
-    let coordinates = Coordinates::SumDifference { weight: 1.0 };
+    let coordinates = Coordinates::sum_difference(1.0);
     let held_out = HoldOut::new(&known, 0, 24, 500).unwrap();
     let predictions = held_out.predict(&Settings {
         coordinates,
@@ -313,7 +313,7 @@ fn samples_without_frames_are_held_out_by_clusters() {
         .filter(|p| p.residual(1).unwrap().abs() < 0.1)
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
-    assert_eq!(select(&known, Settings::DEFAULT).trials.len(), 3);
+    assert_eq!(select(&known, Settings::DEFAULT).trials.len(), 4);
 }
 
 #[test]
@@ -326,7 +326,7 @@ fn blocks_leave_no_seams_whole_or_cut() {
         let settings = Settings {
             block_deg: 12.0,
             tolerance,
-            coordinates: Coordinates::SumDifference { weight: 0.5 },
+            coordinates: Coordinates::sum_difference(0.5),
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };

@@ -139,11 +139,11 @@ impl CellSettings {
             ("chords", "") => self.space = Space::Chords,
             ("half", _) => {
                 let weight = positive()?;
-                self.space = Space::Symmetric(Coordinates::HalfDifference { weight });
+                self.space = Space::Symmetric(Coordinates::half_difference(weight));
             }
             ("sum", _) => {
                 let weight = positive()?;
-                self.space = Space::Symmetric(Coordinates::SumDifference { weight });
+                self.space = Space::Symmetric(Coordinates::sum_difference(weight));
             }
             ("linear", "") => self.values = Values::Linear,
             ("log", "") => self.values = Values::Logarithm,

@@ -70,8 +70,10 @@ impl std::fmt::Display for Space {
         match self {
             Space::Angles => f.write_str("angles"),
             Space::Chords => f.write_str("chords"),
-            Space::Symmetric(Coordinates::HalfDifference { weight }) => write!(f, "half={weight}"),
-            Space::Symmetric(Coordinates::SumDifference { weight }) => write!(f, "sum={weight}"),
+            Space::Symmetric(Coordinates { power, weight }) => {
+                let name = if *power == 0.0 { "half" } else { "sum" };
+                write!(f, "{name}={weight}")
+            }
         }
     }
 }

@@ -16,6 +16,8 @@ use std::borrow::Borrow;
 pub struct BlockSettings {
     /// Range of the kernel in radii of the neighbourhood.
     pub range: f32,
+    /// What the second half of a point counts in the kernel's distances, over what it counts in others.
+    pub stretch: f32,
     /// Variance of the logarithm of one sample.
     pub noise_variance: f32,
     /// Smallest nugget (noise over signal variance): single precision needs one.
@@ -57,8 +59,8 @@ pub struct BlockSolver {
     factored: bool,
     /// Kernel of a few places with all nodes, and what the factor makes of it.
     columns: Vec<f32>,
-    /// √3 over the range.
-    scale: f32,
+    /// √3 over the range, axis by axis.
+    scale: Point,
     trend: Trend,
     /// The trend at the nodes less that in the middle.
     trends: Vec<f32>,
@@ -85,7 +87,9 @@ impl BlockSolver {
         let padded = n.next_multiple_of(PAD);
         self.middle = middle;
         self.trend = settings.trend;
-        self.scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
+        let scale = 3f32.sqrt() / (settings.range * radius.max(1e-6));
+        let second = scale * settings.stretch;
+        self.scale = [scale, scale, scale, second, second, second];
         self.load(nodes, padded);
         self.limits = [0, 1, 2].map(|c| limits_of(&self.log_values[c][..n]));
         if n >= 2 {
@@ -144,7 +148,7 @@ impl BlockSolver {
                 .sum::<f32>();
         let scaled: Vec<Point> = places
             .iter()
-            .map(|p| std::array::from_fn(|k| (p[k] - self.middle[k]) * self.scale))
+            .map(|p| std::array::from_fn(|k| (p[k] - self.middle[k]) * self.scale[k]))
             .collect();
         let correlation = |a: &Point, b: &Point| {
             let s = distance2(a, b).sqrt();
@@ -204,7 +208,7 @@ impl BlockSolver {
         for (row, node) in nodes.enumerate() {
             let node = node.borrow();
             for k in 0..6 {
-                let x = (node.point[k] - self.middle[k]) * self.scale;
+                let x = (node.point[k] - self.middle[k]) * self.scale[k];
                 self.axes[k][row] = x;
                 self.norms[row] += x * x;
             }
@@ -477,7 +481,7 @@ impl WithSimd for Evaluate<'_> {
         for point in self.places {
             let mut place = Place::<S>::at_origin(simd);
             for k in 0..6 {
-                place.set(simd, k, (point[k] - s.middle[k]) * s.scale);
+                place.set(simd, k, (point[k] - s.middle[k]) * s.scale[k]);
             }
             let mut sums = [simd.splat_f32s(0.0); 3];
             let mut r = 0;
@@ -539,7 +543,7 @@ impl WithSimd for Variance<'_> {
             for (lane, point) in places.iter().enumerate() {
                 buffer[7 * lanes + lane] = s.trend.at(point) - in_middle;
                 for k in 0..6 {
-                    let x = (point[k] - s.middle[k]) * s.scale;
+                    let x = (point[k] - s.middle[k]) * s.scale[k];
                     buffer[k * lanes + lane] = x;
                     buffer[6 * lanes + lane] += x * x;
                 }
@@ -776,6 +780,7 @@ mod tests {
 
     const SETTINGS: BlockSettings = BlockSettings {
         range: 8.0,
+        stretch: 1.0,
         noise_variance: 1e-6,
         nugget_min: 1e-4,
         trend: Trend::NONE,
@@ -904,7 +909,7 @@ mod tests {
     /// Nodes along the second half's first axis, whose values follow the trend of half/difference
     /// coordinates so many times.
     fn along_the_trend(times: f32) -> (BlockSettings, Vec<Node>) {
-        let trend = Coordinates::HalfDifference { weight: 0.5 }.trend();
+        let trend = Coordinates::half_difference(0.5).trend();
         let settings = BlockSettings { trend, ..SETTINGS };
         let nodes = (0..60)
             .map(|k| {

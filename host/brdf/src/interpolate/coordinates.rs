@@ -8,34 +8,37 @@ use crate::direction::Vec3;
 /// A point of the six-dimensional embedding.
 pub type Point = [f32; 6];
 
-/// A system of coordinates for pairs of directions.
+/// A system of coordinates for pairs of directions: `(√2 h |½(i + v)|^p, w (i − v)/√2)` with the unit half vector h.
+///
+/// For p = 0 these are half vector and difference: sharp highlights depend on h alone. For p = 1 they are
+/// sum and difference, and with w = 1 the plain chord distance, rotated. In between, pairs of one half vector
+/// differ a little by the angle between light and view too, which pays on all but the sharpest materials
+/// (docs/results.md).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Coordinates {
-    /// `(√2·h, w (i − v)/√2)` with the unit half vector h: highlights depend on h alone, so it
-    /// suits sharp lobes.
-    HalfDifference {
-        /// Weight w of the difference.
-        weight: f64,
-    },
-    /// `((i + v)/√2, w (i − v)/√2)`: for w = 1 the plain chord distance, rotated.
-    SumDifference {
-        /// Weight w of the difference.
-        weight: f64,
-    },
+pub struct Coordinates {
+    /// The power p of the sum's length, 0 ..= 1.
+    pub power: f64,
+    /// Weight w of the difference.
+    pub weight: f64,
 }
 
 impl Coordinates {
+    /// Half vector and difference.
+    pub const fn half_difference(weight: f64) -> Self {
+        Self { power: 0.0, weight }
+    }
+
+    /// Sum and difference.
+    pub const fn sum_difference(weight: f64) -> Self {
+        Self { power: 1.0, weight }
+    }
+
     /// The point of a pair of unit vectors.
     pub fn point(&self, light: Vec3, view: Vec3) -> Point {
         let sum = [light[0] + view[0], light[1] + view[1], light[2] + view[2]];
-        let (scale, weight) = match *self {
-            Self::HalfDifference { weight } => {
-                let length = crate::direction::dot(sum, sum).sqrt().max(1e-9);
-                (std::f64::consts::SQRT_2 / length, weight)
-            }
-            Self::SumDifference { weight } => (std::f64::consts::FRAC_1_SQRT_2, weight),
-        };
-        let w = weight * std::f64::consts::FRAC_1_SQRT_2;
+        let length = crate::direction::dot(sum, sum).sqrt().max(1e-9);
+        let scale = std::f64::consts::SQRT_2 / length * self.stretch(0.5 * length);
+        let w = self.weight * std::f64::consts::FRAC_1_SQRT_2;
         [
             (sum[0] * scale) as f32,
             (sum[1] * scale) as f32,
@@ -46,19 +49,27 @@ impl Coordinates {
         ]
     }
 
+    /// `x^p`, quick where it can be.
+    fn stretch(&self, x: f64) -> f64 {
+        match self.power {
+            0.0 => 1.0,
+            0.25 => x.sqrt().sqrt(),
+            1.0 => x,
+            power => x.powf(power),
+        }
+    }
+
     /// Where the pair of unit vectors at `point` lies in other coordinates.
     pub fn convert(&self, point: &Point, to: Coordinates) -> Point {
-        let (from_half, from) = self.kind();
-        let (to_half, to) = to.kind();
-        let ratio = (to / from) as f32;
+        let ratio = (to.weight / self.weight) as f32;
         let difference = [point[3] * ratio, point[4] * ratio, point[5] * ratio];
-        // |i + v|² + |i − v|² = 4.
-        let length2: f32 = difference.iter().map(|d| d * d).sum();
-        let sum = (4.0 - 2.0 / (to * to) as f32 * length2).max(1e-6).sqrt();
-        let scale = match (from_half, to_half) {
-            (true, false) => 0.5 * sum,
-            (false, true) => 2.0 / sum,
-            _ => 1.0,
+        let scale = if self.power == to.power {
+            1.0
+        } else {
+            // |i + v|² + |i − v|² = 4.
+            let length2: f32 = difference.iter().map(|d| d * d).sum();
+            let half2 = (1.0 - 0.5 / (to.weight * to.weight) as f32 * length2).max(2.5e-7);
+            half2.powf(0.5 * (to.power - self.power) as f32)
         };
         let [x, y, z] = [point[0] * scale, point[1] * scale, point[2] * scale];
         [x, y, z, difference[0], difference[1], difference[2]]
@@ -66,28 +77,23 @@ impl Coordinates {
 
     /// What logarithms rise by on their own in these coordinates.
     pub fn trend(&self) -> Trend {
-        match *self {
-            Self::HalfDifference { weight } => Trend {
-                per_difference2: (0.5 / (weight * weight)) as f32,
-            },
-            Self::SumDifference { .. } => Trend::NONE,
-        }
-    }
-
-    /// Whether the sum is normalised, and the weight of the difference.
-    fn kind(&self) -> (bool, f64) {
-        match *self {
-            Self::HalfDifference { weight } => (true, weight),
-            Self::SumDifference { weight } => (false, weight),
+        if self.power < 1.0 {
+            Trend {
+                per_difference2: (0.5 / (self.weight * self.weight)) as f32,
+            }
+        } else {
+            Trend::NONE
         }
     }
 }
 
 impl std::fmt::Display for Coordinates {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::HalfDifference { weight } => write!(f, "half/difference w={weight}"),
-            Self::SumDifference { weight } => write!(f, "sum/difference w={weight}"),
+        let (power, weight) = (self.power, self.weight);
+        match power {
+            0.0 => write!(f, "half/difference w={weight}"),
+            1.0 => write!(f, "sum/difference w={weight}"),
+            _ => write!(f, "half/difference w={weight} p={power}"),
         }
     }
 }
@@ -141,8 +147,8 @@ mod tests {
         let a = Direction::from_deg(30.0, 50.0).to_vec3();
         let b = Direction::from_deg(70.0, 200.0).to_vec3();
         for coordinates in [
-            Coordinates::HalfDifference { weight: 0.5 },
-            Coordinates::SumDifference { weight: 0.5 },
+            Coordinates::half_difference(0.5),
+            Coordinates::sum_difference(0.5),
         ] {
             let (p, q) = (coordinates.point(a, b), coordinates.point(b, a));
             for k in 0..3 {
@@ -155,9 +161,17 @@ mod tests {
     #[test]
     fn converted_points_are_those_of_the_directions() {
         let systems = [
-            Coordinates::HalfDifference { weight: 0.5 },
-            Coordinates::HalfDifference { weight: 0.25 },
-            Coordinates::SumDifference { weight: 1.0 },
+            Coordinates::half_difference(0.5),
+            Coordinates::half_difference(0.25),
+            Coordinates::sum_difference(1.0),
+            Coordinates {
+                power: 0.25,
+                weight: 1.0,
+            },
+            Coordinates {
+                power: 0.1,
+                weight: 1.0,
+            },
         ];
         let at = |theta, phi| Direction::from_deg(theta, phi).to_vec3();
         for (i, v) in [((10.0, 20.0), (40.0, 80.0)), ((86.0, 0.0), (84.0, 179.0))] {
@@ -180,11 +194,11 @@ mod tests {
         );
         let point = |c: &Coordinates| c.point(i.to_vec3(), v.to_vec3());
         for weight in [0.25, 0.5] {
-            let c = Coordinates::HalfDifference { weight };
+            let c = Coordinates::half_difference(weight);
             let expected = -0.5 * 60f64.to_radians().cos().ln();
             assert!((f64::from(c.trend().at(&point(&c))) - expected).abs() < 1e-5);
         }
-        let c = Coordinates::SumDifference { weight: 0.5 };
+        let c = Coordinates::sum_difference(0.5);
         assert_eq!(c.trend().at(&point(&c)), 0.0);
     }
 
@@ -192,7 +206,7 @@ mod tests {
     fn sum_and_difference_of_weight_one_keep_chord_distances() {
         let d = |t, p| Direction::from_deg(t, p).to_vec3();
         let (i, v, j, w) = (d(10.0, 20.0), d(40.0, 80.0), d(15.0, 25.0), d(45.0, 70.0));
-        let c = Coordinates::SumDifference { weight: 1.0 };
+        let c = Coordinates::sum_difference(1.0);
         let chord2: f64 = (0..3)
             .map(|k| (i[k] - j[k]).powi(2) + (v[k] - w[k]).powi(2))
             .sum();

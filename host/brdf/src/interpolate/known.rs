@@ -10,7 +10,10 @@ use std::num::NonZero;
 /// The coordinates that many nodes are sorted in. What is near in one system is near in another, so that
 /// the order serves for all: sorting is what costs most. Of few bins, neighbours lie far apart, and
 /// are near in one system only; these are sorted anew for each.
-const SORTED_IN: Coordinates = Coordinates::HalfDifference { weight: 0.5 };
+pub(super) const SORTED_IN: Coordinates = Coordinates {
+    power: 0.1,
+    weight: 1.0,
+};
 
 /// Bins, and their nodes in order.
 pub struct Known<'a> {
@@ -192,7 +195,7 @@ mod tests {
         let bins = bins();
         let known = Known::new(&bins);
         let keep = |bin: usize| !bin.is_multiple_of(3);
-        let part = known.part(Coordinates::SumDifference { weight: 0.5 }, keep);
+        let part = known.part(Coordinates::sum_difference(0.5), keep);
         let (mut near, mut found) = (Vec::new(), Vec::new());
         let place = part.node(Detail::Bins, 500).point;
         part.around(&place, 40, &mut near);

@@ -46,8 +46,11 @@ pub struct Settings {
     pub nodes: usize,
     /// Of many bins, one in so many is looked at: for [`Known::thinned`].
     pub one_bin_in: usize,
-    /// Where distances are taken.
+    /// Where neighbours are looked for.
     pub coordinates: Coordinates,
+    /// Weight of the difference of light and view in the kernel's distances, beside the one in the
+    /// coordinates: which nodes tell most, and how much each tells, are two questions.
+    pub kernel_weight: f64,
     /// Range of the kernel in radii of the neighbourhood; at least 3.5.
     pub range: f32,
     /// Variance of the natural logarithm of one sample.
@@ -97,7 +100,8 @@ impl Preset {
             budget,
             nodes,
             one_bin_in,
-            coordinates: Coordinates::HalfDifference { weight: 0.5 },
+            coordinates: known::SORTED_IN,
+            kernel_weight: 0.3,
             range: 8.0,
             noise_variance: 1e-4,
             nugget_min: 1e-4,
@@ -133,6 +137,7 @@ impl Settings {
     fn block(&self) -> block::BlockSettings {
         block::BlockSettings {
             range: self.range,
+            stretch: (self.kernel_weight / self.coordinates.weight) as f32,
             noise_variance: self.noise_variance,
             nugget_min: self.nugget_min,
             trend: self.coordinates.trend(),
@@ -147,11 +152,12 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "blocks of {} deg, tolerance {:.2} noise, {} nodes, {}, range {} radii, noise {:.2} %, nugget at least {:e}",
+            "blocks of {} deg, tolerance {:.2} noise, {} nodes, {}, kernel w={}, range {} radii, noise {:.2} %, nugget at least {:e}",
             self.block_deg,
             self.tolerance,
             self.nodes,
             self.coordinates,
+            self.kernel_weight,
             self.range,
             100.0 * self.noise_variance.sqrt(),
             self.nugget_min

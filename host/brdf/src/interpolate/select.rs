@@ -15,15 +15,10 @@ const TESTS: usize = 1200;
 const NOISE_BINS: usize = 300_000;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
-/// The systems of coordinates that compete; of those that are as good as the best, the first.
-const CANDIDATES: [Coordinates; 3] = [
-    Coordinates::HalfDifference { weight: 0.5 },
-    Coordinates::SumDifference { weight: 0.5 },
-    Coordinates::SumDifference { weight: 1.0 },
-];
+/// What competes: the power of the sum's length in the coordinates, and the kernel's weight. The last is for
+/// retro-reflectors, whose peak depends on the difference of light and view.
+const CANDIDATES: [(f64, f64); 4] = [(0.0, 0.3), (0.1, 0.3), (0.25, 0.3), (0.25, 1.0)];
 
-/// A ratio of errors that means nothing.
-const TIE: f64 = 1.05;
 /// Only where both elevations are below this do held-out frames have others all around them; beyond, it
 /// is extrapolation that would be judged. Degrees.
 const INTERIOR_DEG: f64 = 75.0;
@@ -62,8 +57,12 @@ pub fn select(known: &Known, base: Settings) -> Selection {
     }
     let sets = HoldOut::sets(bins);
     let tests = TESTS / sets as usize;
-    let candidates = CANDIDATES.map(|coordinates| Settings {
-        coordinates,
+    let candidates = CANDIDATES.map(|(power, kernel_weight)| Settings {
+        coordinates: Coordinates {
+            power,
+            ..base.coordinates
+        },
+        kernel_weight,
         ..settings
     });
     let mut squares = CANDIDATES.map(|_| Vec::new());
@@ -81,13 +80,11 @@ pub fn select(known: &Known, base: Settings) -> Selection {
         .filter(|(_, squares)| !squares.is_empty())
         .map(|(settings, squares)| Trial {
             settings,
-            log_rms: mean(squares).sqrt(),
+            log_rms: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
         })
         .collect();
-    let best = squares.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)));
-    let as_good = best.and_then(|best| squares.iter().position(|other| tie(best, other)));
-    if let Some(trial) = as_good.and_then(|number| trials.get(number)) {
-        settings = trial.settings;
+    if let Some(best) = trials.iter().min_by(|a, b| a.log_rms.total_cmp(&b.log_rms)) {
+        settings = best.settings;
     }
     let cover = cover(bins.grid(), &settings.patch_sizes_deg());
     let sorted = known.sorted_for(settings.coordinates);
@@ -111,39 +108,4 @@ fn square(prediction: &Prediction) -> Option<f64> {
         .filter_map(|c| prediction.residual(c))
         .map(|r| f64::from(r.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)).powi(2));
     (f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()).then(|| squares.sum::<f64>() / 3.0)
-}
-
-/// Whether a candidate is as good as the best, as far as the same tests can tell: nearly as good in any
-/// case, or worse by less than the standard error of their difference, because a few tests in a sharp
-/// highlight may make all of that.
-fn tie(best: &[f64], other: &[f64]) -> bool {
-    if mean(other) <= TIE * TIE * mean(best) {
-        return true;
-    }
-    let differences: Vec<f64> = other.iter().zip(best).map(|(o, b)| o - b).collect();
-    let worse = mean(&differences);
-    let squares: Vec<f64> = differences.iter().map(|d| (d - worse).powi(2)).collect();
-    worse <= (mean(&squares) / squares.len() as f64).sqrt()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_is_worse_on_many_tests_is_no_tie() {
-        let best: Vec<f64> = (0..1000).map(|k| 1.0 + 0.1 * f64::from(k % 7)).collect();
-        let times = |factor: f64| best.iter().map(|b| factor * b).collect::<Vec<f64>>();
-        assert!(tie(&best, &best) && tie(&best, &times(1.1)));
-        assert!(!tie(&best, &times(1.2)));
-        // A fifth worse too, but by one test, and better by another.
-        let mut by_one = best.clone();
-        by_one[500] += 400.0;
-        by_one[501] -= 140.0;
-        assert!(mean(&by_one) > 1.15 * mean(&best) && tie(&best, &by_one));
-    }
 }
