@@ -13,7 +13,7 @@ use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{Calibration, Known, Origin, Settings, origins, select};
 use gonia_brdf::{Bins, Brdf, Grid};
-use plan::{MATERIALS, cpu_seconds, material, measure};
+use plan::{asked, cpu_seconds, material, measure};
 
 /// One frame in so many of a sparse plan.
 const SPARSE: u32 = 10;
@@ -47,14 +47,9 @@ impl std::fmt::Display for Shares {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let sparse = arguments.iter().any(|a| a == "--sparse");
-    let asked = |name: &&str| arguments.iter().any(|a| a == name);
-    let mut names: Vec<&str> = MATERIALS.into_iter().filter(asked).collect();
-    if names.is_empty() {
-        names = MATERIALS.to_vec();
-    }
     println!("percent within the 95 % interval, interior (grazing)");
     println!("material       held out  interpolated      measured  calibration, CPU-s");
-    for name in names {
+    for name in asked(&arguments) {
         let model = material(name);
         let mut samples = measure(&*model);
         let mut grid = Grid::PAPER;

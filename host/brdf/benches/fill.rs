@@ -29,20 +29,11 @@ fn main() {
             .position(|a| a == name)
             .map_or(default, |k| arguments[k + 1].parse().expect("a number"))
     };
-    let names = plan::MATERIALS;
-    let asked: Vec<&str> = names
-        .into_iter()
-        .filter(|n| arguments.iter().any(|a| a == n))
-        .collect();
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
     println!(
         "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior grazing  all  void  settings"
     );
-    for name in if asked.is_empty() {
-        names.to_vec()
-    } else {
-        asked
-    } {
+    for name in plan::asked(&arguments) {
         let model = material(name);
         let samples = measure(&*model);
         let start = Instant::now();

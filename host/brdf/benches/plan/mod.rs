@@ -2,20 +2,36 @@
 
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
-use gonia_brdf::model::{Ggx, Kurt, KurtLobe, Ward};
+use gonia_brdf::model::{Ggx, Kurt, KurtLobe, Material, Ward};
 use gonia_brdf::{Brdf, Direction, Sample};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Standard deviation of the noise, relative.
 pub const NOISE: f64 = 0.015;
 
-/// All names that [`material`] knows.
+/// What interpolation was tuned on.
 #[allow(dead_code)] // Some benches need one only.
 pub const MATERIALS: [&str; 8] = [
     "matte", "broad", "fabric", "sharp", "sharper", "round", "ggx", "ward",
 ];
 
-pub fn material(name: &str) -> Box<dyn Brdf> {
+/// The materials that arguments name, these and those of `gonia demo`; without one, those above.
+#[allow(dead_code)]
+pub fn asked(arguments: &[String]) -> Vec<&'static str> {
+    let others = Material::NAMES.into_iter();
+    let known = MATERIALS
+        .into_iter()
+        .chain(others.filter(|name| !MATERIALS.contains(name)));
+    let mut asked: Vec<_> = known.filter(|n| arguments.iter().any(|a| a == n)).collect();
+    if asked.is_empty() {
+        asked = MATERIALS.to_vec();
+    }
+    asked
+}
+
+/// The material of a name.
+pub fn material(name: &str) -> Arc<dyn Brdf> {
     let lobe = |specular: f64, mx, my| KurtLobe {
         specular: [specular, 0.8 * specular, 0.6 * specular],
         f0: 0.05,
@@ -25,7 +41,7 @@ pub fn material(name: &str) -> Box<dyn Brdf> {
         azimuth_deg: 31.0,
     };
     if name == "ggx" {
-        return Box::new(Ggx {
+        return Arc::new(Ggx {
             diffuse: [0.1, 0.2, 0.3],
             specular: [1.0; 3],
             f0: 0.04,
@@ -35,7 +51,7 @@ pub fn material(name: &str) -> Box<dyn Brdf> {
         });
     }
     if name == "ward" {
-        return Box::new(Ward {
+        return Arc::new(Ward {
             diffuse: [0.3, 0.2, 0.1],
             specular: [0.1; 3],
             alpha_x: 0.08,
@@ -43,13 +59,13 @@ pub fn material(name: &str) -> Box<dyn Brdf> {
             azimuth_deg: 12.0,
         });
     }
-    Box::new(match name {
+    Arc::new(match name {
         "matte" => Kurt::white_reference_fabric(),
         "broad" => Kurt::new([0.2, 0.15, 0.1], &[lobe(2.0, 0.15, 0.4)]),
         "sharp" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.05, 0.3)]),
         "round" => Kurt::new([0.1, 0.2, 0.15], &[lobe(0.9, 0.07, 0.07)]),
         "sharper" => Kurt::new([0.2, 0.15, 0.1], &[lobe(1.0, 0.03, 0.12)]),
-        _ => Kurt::two_thread_fabric(),
+        _ => return Material::named(name).expect("a material").brdf,
     })
 }
 
