@@ -30,7 +30,8 @@ pub fn asked(arguments: &[String]) -> Vec<&'static str> {
     asked
 }
 
-/// The material of a name.
+/// The material of a name that [`asked`] gave.
+#[allow(clippy::expect_used)]
 pub fn material(name: &str) -> Arc<dyn Brdf> {
     let lobe = |specular: f64, mx, my| KurtLobe {
         specular: [specular, 0.8 * specular, 0.6 * specular],
