@@ -326,14 +326,13 @@ fn blocks_leave_no_seams_whole_or_cut() {
         let settings = Settings {
             block_deg: 12.0,
             tolerance,
-            coordinates: Coordinates::sum_difference(0.5),
             noise_variance: (NOISE * NOISE) as f32,
             ..Settings::DEFAULT
         };
         let dense = fill(&known, &settings, &|_| ()).unwrap();
         let (across, inside) = bends(&dense, &model, settings.block_deg);
         println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
-        // Without blending 1.6 times.
+        // 1.6 times where blending may shift blocks by their usual difference only.
         assert!(across < 1.3 * inside, "{across} {inside}");
     }
 }

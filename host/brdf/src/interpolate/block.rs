@@ -906,6 +906,40 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_stretch_is_a_kernel_of_shorter_axes() {
+        // Once by the settings, once by the points; nodes and places off both halves' axes.
+        let moved = |node: &Node, by: f32| {
+            let mut node = *node;
+            node.point[4] = by * node.point[1];
+            node
+        };
+        let place = |by: f32| moved(&node(0.13, -0.21, 1.0), by).point;
+        let predicted = |by: f32, stretch: f32| {
+            let nodes: Vec<Node> = scattered(60).iter().map(|n| moved(n, by)).collect();
+            let settings = BlockSettings {
+                stretch,
+                ..SETTINGS
+            };
+            let mut solver = BlockSolver::default();
+            solver.fit(nodes.iter(), [0.0; 6], 0.7, &settings);
+            let mut variance = Vec::new();
+            solver.variances_at(&[place(by)], &mut variance);
+            let of_mean = solver.variance_of_mean(&[place(by)]);
+            [at(&solver, &place(by))[0], variance[0][0], of_mean[0]]
+        };
+        let (by_settings, by_points, plain) = (
+            predicted(2.0, 0.5),
+            predicted(1.0, 1.0),
+            predicted(2.0, 1.0),
+        );
+        for k in 0..3 {
+            let near = (by_settings[k] / by_points[k] - 1.0).abs();
+            let far = (plain[k] / by_points[k] - 1.0).abs();
+            assert!(near < 1e-3 && far > 3.0 * near, "{k}: {near} {far}");
+        }
+    }
+
     /// Nodes along the second half's first axis, whose values follow the trend of half/difference
     /// coordinates so many times.
     fn along_the_trend(times: f32) -> (BlockSettings, Vec<Node>) {
