@@ -1,6 +1,7 @@
 //! Binning: samples that share a cell become one value, their median (paper, Section III).
 
 mod node;
+mod noise;
 
 use crate::grid::Grid;
 use crate::sample::Sample;
@@ -33,6 +34,7 @@ pub struct Bins {
     grid: Grid,
     bins: Vec<Bin>,
     outside: usize,
+    noise_variance: Option<f32>,
 }
 
 impl Bins {
@@ -49,7 +51,8 @@ impl Bins {
             .collect();
         let nodes = Nodes::new(grid);
         let lights: Vec<usize> = (0..grid.n_directions()).collect();
-        let parts: Vec<Vec<Bin>> = lights
+        let asked_one_in = samples.len().div_ceil(NOISE_SAMPLES).max(1) | 1;
+        let (parts, variances): (Vec<Vec<Bin>>, Vec<Vec<f32>>) = lights
             .par_chunks(LIGHTS_AT_A_TIME)
             .map(|lights| {
                 let mut scratch = Vec::new();
@@ -59,6 +62,7 @@ impl Bins {
                 let samples_here =
                     |light: &usize| shares.iter().map(|s| s.of(*light).len()).sum::<usize>();
                 let mut bins = Vec::with_capacity(lights.iter().map(samples_here).sum());
+                let mut variances = Vec::new();
                 for &light in lights {
                     keys.clear();
                     for share in &shares {
@@ -76,15 +80,20 @@ impl Bins {
                         let nodes = (nodes.at(light), nodes.at(view_of(same[0])));
                         let cell = grid.cell(light, view_of(same[0]));
                         bins.push(summarize(cell, nodes, group, &mut scratch));
+                        if cell.is_multiple_of(asked_one_in) {
+                            variances
+                                .extend(noise::variances_about_plane(group).into_iter().flatten());
+                        }
                     }
                 }
-                bins
+                (bins, variances)
             })
-            .collect();
+            .unzip();
         Self {
             grid,
             bins: joined(&parts),
             outside: shares.iter().map(|share| share.outside).sum(),
+            noise_variance: noise::usual(variances.concat()),
         }
     }
 
@@ -96,6 +105,11 @@ impl Bins {
     /// The filled cells.
     pub fn bins(&self) -> &[Bin] {
         &self.bins
+    }
+
+    /// Variance of the natural logarithm of one sample; `None` where no cell has enough samples to tell.
+    pub fn noise_variance(&self) -> Option<f32> {
+        self.noise_variance
     }
 
     /// How many samples fell outside the grid.
@@ -137,6 +151,9 @@ fn joined(parts: &[Vec<Bin>]) -> Vec<Bin> {
         })
         .collect()
 }
+
+/// So many samples, about, tell the noise.
+const NOISE_SAMPLES: usize = 600_000;
 
 /// Light directions that one task sorts and summarizes.
 const LIGHTS_AT_A_TIME: usize = 32;

@@ -91,7 +91,7 @@ impl Preset {
         let (block_deg, tolerance, budget, nodes, one_bin_in) = match self {
             Preset::Preview => (10.0, f32::INFINITY, 0.0, 64, 8),
             Preset::Fast => (8.0, 2.0, 2.0, 64, 1),
-            Preset::Default => (8.0, 1.0, 6.0, 128, 1),
+            Preset::Default => (8.0, 1.0, 8.0, 128, 1),
             Preset::Best => (8.0, 0.5, f32::INFINITY, 256, 1),
         };
         Settings {

@@ -6,13 +6,10 @@ use super::budget::affordable_tolerance;
 use super::coordinates::Coordinates;
 use super::hold_out::{HoldOut, Prediction};
 use super::known::Known;
-use super::nodes::log_noise_variance;
 use super::patches::cover;
 
 /// Held-out bins that are predicted, at most, over all sets.
 const TESTS: usize = 1200;
-/// Bins that tell the noise, about.
-const NOISE_BINS: usize = 300_000;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
 /// What competes: the power of the sum's length in the coordinates, and the kernel's weight. The last is for
@@ -42,7 +39,7 @@ pub struct Selection {
     pub trials: Vec<Trial>,
 }
 
-/// Estimates the noise from the spread inside bins, then tries the candidate coordinates on frames
+/// Takes the noise that the bins show, then tries the candidate coordinates on frames
 /// (or, without frame numbers, clusters of directions) held out. With too few of them, `base` keeps
 /// its coordinates. The tolerance is raised where cutting would cost more than the budget.
 pub fn select(known: &Known, base: Settings) -> Selection {
@@ -51,8 +48,7 @@ pub fn select(known: &Known, base: Settings) -> Selection {
         one_bin_in: known.one_bin_in(),
         ..base
     };
-    let stride = (bins.bins().len() / NOISE_BINS).max(1) | 1;
-    if let Some(variance) = log_noise_variance(bins.bins().iter().step_by(stride)) {
+    if let Some(variance) = bins.noise_variance() {
         settings.noise_variance = variance;
     }
     let sets = HoldOut::sets(bins);
