@@ -2,7 +2,7 @@
 //! RMS of ln(f/f_true) over missing cells.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 1 | --sum 0.5] [--kernel 0.5]`
+//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 1 | --sum 0.5] [--kernel 0.5] [--noise 0.015]`
 
 #![allow(clippy::expect_used)]
 
@@ -14,7 +14,7 @@ use gonia_brdf::interpolate::{
     Calibration, Coordinates, Known, Preset, Selection, Settings, fill, fill_with_errors, select,
 };
 use gonia_brdf::{Bins, Brdf, Grid};
-use plan::{cpu_seconds, material, measure};
+use plan::{cpu_seconds, material, measure_with};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -30,12 +30,13 @@ fn main() {
             .map_or(default, |k| arguments[k + 1].parse().expect("a number"))
     };
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
+    let noise = option("--noise", plan::NOISE);
     println!(
         "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior grazing  all  void  settings"
     );
     for name in plan::asked(&arguments) {
         let model = material(name);
-        let samples = measure(&*model);
+        let samples = measure_with(&*model, noise);
         let start = Instant::now();
         let bins = Bins::new(grid, &samples);
         let bin_s = start.elapsed().as_secs_f64();
@@ -75,7 +76,7 @@ fn main() {
                 settings: Settings {
                     coordinates,
                     kernel_weight: option("--kernel", weight),
-                    noise_variance: (plan::NOISE * plan::NOISE) as f32,
+                    noise_variance: (noise * noise) as f32,
                     ..base
                 },
                 trials: Vec::new(),

@@ -112,6 +112,20 @@ impl Bins {
         self.noise_variance
     }
 
+    /// Natural logarithm of what a bin's median says of the true value, of one channel; the median counts as
+    /// `floor` at least.
+    ///
+    /// The noise of samples is as much above the value as below it, but their logarithms lie lower in the mean, by half of
+    /// the median's relative variance: nothing at 1.5 % of noise, and two per cent of a single sample at the 20 %
+    /// of a coarse yarn, which no averaging over bins would take away.
+    pub fn log_value(&self, bin: &Bin, channel: usize, floor: f32) -> f32 {
+        let variance = self
+            .noise_variance
+            .map_or(0.0, |v| v.min(NOISE_MAX * NOISE_MAX));
+        let of_bin = variance * variance_of_median(bin.count) / bin.count.max(1) as f32;
+        bin.median[channel].max(floor).ln() + 0.5 * of_bin
+    }
+
     /// How many samples fell outside the grid.
     pub fn outside(&self) -> usize {
         self.outside
@@ -154,6 +168,9 @@ fn joined(parts: &[Vec<Bin>]) -> Vec<Bin> {
 
 /// So many samples, about, tell the noise.
 const NOISE_SAMPLES: usize = 600_000;
+
+/// Of more noise than this, relative to the value, half a variance is not what logarithms lie lower by.
+const NOISE_MAX: f32 = 0.5;
 
 /// Light directions that one task sorts and summarizes.
 const LIGHTS_AT_A_TIME: usize = 32;
@@ -260,6 +277,19 @@ fn summarize(
     }
 }
 
+/// Variance of the median of normal values over that of their mean, within 2 % of
+/// the exact ratios for 1 to 10 values.
+pub fn variance_of_median(count: u32) -> f32 {
+    use std::f32::consts::FRAC_PI_2;
+    let n = count.max(1) as f32;
+    let fewer = if count.is_multiple_of(2) {
+        1.3
+    } else {
+        FRAC_PI_2 - 1.0
+    };
+    (FRAC_PI_2 * n / (n + fewer)).max(1.0)
+}
+
 /// The median of finite values, which are reordered; of an even number the mean of the middle two.
 /// 0 of none.
 pub fn median(values: &mut [f32]) -> f32 {
@@ -332,6 +362,37 @@ mod tests {
         let mean = Direction::from_vec3(bin.light.map(f64::from));
         assert!((mean.theta_deg() - 40.17).abs() < 0.01, "{mean:?}");
         assert!(mean.phi_deg() < 1e-3 || mean.phi_deg() > 359.999);
+    }
+
+    #[test]
+    fn logarithms_of_noisy_bins_have_the_mean_of_the_truth() {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
+            (state >> 33) as f32 / (1u64 << 31) as f32
+        };
+        for count in [1, 2, 5] {
+            let samples: Vec<Sample> = (0..7920 * 4)
+                .flat_map(|k| vec![k; count])
+                .chain((0..7920).flat_map(|_| vec![0; 6]))
+                .map(|k| {
+                    let normal = (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+                    let (row, column) = (k / 180, k % 180);
+                    Sample {
+                        theta_v_deg: 2.0 * (row % 40 + 1) as f32,
+                        phi_v_deg: 2.0 * column as f32,
+                        ..sample(2.0 * (row / 40) as f32, 0.0, 3.0 * (1.0 + 0.2 * normal), 0)
+                    }
+                })
+                .collect();
+            let bins = Bins::new(Grid::PAPER, &samples);
+            let of_count = bins.bins().iter().filter(|b| b.count == count as u32);
+            let logs: Vec<f32> = of_count
+                .map(|b| bins.log_value(b, 0, 1e-3) - 3f32.ln())
+                .collect();
+            let mean = logs.iter().sum::<f32>() / logs.len() as f32;
+            assert!(logs.len() > 20_000 && mean.abs() < 0.004, "{count}: {mean}");
+        }
     }
 
     #[test]

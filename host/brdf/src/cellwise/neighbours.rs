@@ -160,10 +160,12 @@ impl<'a> Neighbours<'a> {
     }
 
     fn value_of(&self, known: Known) -> [f64; 3] {
-        let median = self.bins.bins()[known.bin as usize].median;
+        let bin = &self.bins.bins()[known.bin as usize];
         match self.values {
-            Values::Linear => median.map(f64::from),
-            Values::Logarithm => [0, 1, 2].map(|c| f64::from(median[c].max(self.floor[c])).ln()),
+            Values::Linear => bin.median.map(f64::from),
+            Values::Logarithm => {
+                [0, 1, 2].map(|c| self.bins.log_value(bin, c, self.floor[c]).into())
+            }
         }
     }
 }

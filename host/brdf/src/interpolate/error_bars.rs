@@ -12,7 +12,7 @@ use super::Settings;
 use super::hold_out::{HoldOut, Mean, Prediction};
 use super::known::Known;
 use super::nodes::SIGMA_PER_MAD;
-use crate::bins::{Bin, Bins};
+use crate::bins::{Bin, Bins, variance_of_median};
 use crate::dense::DenseBrdf;
 use crate::direction::{Vec3, dot};
 use crate::grid::Grid;
@@ -175,7 +175,7 @@ impl Calibration {
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
         let error = self.standard_error(light, view, prediction.log, prediction.variance);
         (0..3).filter_map(move |c| {
-            let residual = prediction.residual(c)?;
+            let residual = prediction.residual[c]?;
             let noise = self.noise.of(bin, c);
             Some(residual.powi(2) <= Z95 * Z95 * (error[c] * error[c] + noise))
         })
@@ -194,7 +194,7 @@ impl BinNoise {
             .flat_map(|m| {
                 let p = m.first;
                 (0..3).filter_map(move |c| {
-                    Residual::new(p.residual(c), p.variance[c], stated.of(p.bin, c))
+                    Residual::new(p.residual[c], p.variance[c], stated.of(p.bin, c))
                 })
             })
             .map(|r| (r.noise, USUAL_FACTOR.powi(2) * r.variance, r.limit))
@@ -212,7 +212,7 @@ impl BinNoise {
     /// Variance of the logarithm of a bin's median about the true value at the mean direction, of one
     /// channel.
     fn of(&self, bin: &Bin, channel: usize) -> f32 {
-        let of_median = of_median(bin.count);
+        let of_median = variance_of_median(bin.count);
         let spread = SIGMA_PER_MAD * bin.mad[channel] / bin.median[channel].abs();
         // What the samples scatter by beyond the noise, they do by their places: the mean of these is the
         // bin's, and a median is only off as far as it is not the mean.
@@ -221,19 +221,6 @@ impl BinNoise {
         self.factor * (of_median * self.variance + (of_median - 1.0) * slope)
             / bin.count.max(1) as f32
     }
-}
-
-/// Variance of the median of normal values over that of their mean, within 2 % of
-/// the exact ratios for 1 to 10 values.
-fn of_median(count: u32) -> f32 {
-    use std::f32::consts::FRAC_PI_2;
-    let n = count.max(1) as f32;
-    let fewer = if count.is_multiple_of(2) {
-        1.3
-    } else {
-        FRAC_PI_2 - 1.0
-    };
-    (FRAC_PI_2 * n / (n + fewer)).max(1.0)
 }
 
 /// A residual of one channel.

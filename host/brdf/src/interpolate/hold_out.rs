@@ -47,15 +47,10 @@ pub struct Prediction<'a> {
     pub weight: f32,
     /// Natural logarithm of the value predicted, per channel.
     pub log: [f32; 3],
-    /// Variance of this as the nodes around show it, per channel, not calibrated.
-    pub variance: [f32; 3],
-}
-
-impl Prediction<'_> {
     /// Logarithm of predicted over measured, of channels that can have one.
-    pub fn residual(&self, channel: usize) -> Option<f32> {
-        residual(self.bin, self.log, channel)
-    }
+    pub residual: [Option<f32>; 3],
+    /// Variance of the prediction as the nodes around show it, per channel, not calibrated.
+    pub variance: [f32; 3],
 }
 
 /// What the others make of the held-out bins of one frame (or cluster) in one block. Their mean tells of
@@ -148,7 +143,14 @@ impl<'a> HoldOut<'a> {
     where
         'a: 'b,
     {
-        let grid = self.known.bins().grid();
+        let bins = self.known.bins();
+        let grid = bins.grid();
+        let residual = |bin: &Bin, log: [f32; 3]| {
+            [0, 1, 2].map(|c| {
+                let measured = bins.log_value(bin, c, f32::MIN_POSITIVE);
+                (bin.median[c] > 0.0).then(|| log[c] - measured)
+            })
+        };
         let sorted = self.known.sorted_for(settings.coordinates);
         let nodes = sorted
             .as_ref()
@@ -174,6 +176,7 @@ impl<'a> HoldOut<'a> {
                         bin,
                         weight: *weight,
                         log: predicted.logs[0],
+                        residual: residual(bin, predicted.logs[0]),
                         variance: predicted.variance,
                     },
                     bins: members.iter().map(|m| m.bin).collect(),
@@ -182,9 +185,9 @@ impl<'a> HoldOut<'a> {
                 };
                 let share = 1.0 / members.len() as f32;
                 for (member, log) in members.iter().zip(predicted.logs) {
+                    let own = residual(member.bin, *log);
                     for c in 0..3 {
-                        let own = residual(member.bin, *log, c);
-                        mean.residual[c] = mean.residual[c].zip(own).map(|(m, r)| m + share * r);
+                        mean.residual[c] = mean.residual[c].zip(own[c]).map(|(m, r)| m + share * r);
                     }
                 }
                 mean
@@ -210,12 +213,6 @@ impl AsRef<(Vec3, Vec3)> for Member<'_> {
     fn as_ref(&self) -> &(Vec3, Vec3) {
         &self.place
     }
-}
-
-/// Logarithm of a prediction over what a bin measured, of channels that can have one.
-fn residual(bin: &Bin, log: [f32; 3], channel: usize) -> Option<f32> {
-    let median = bin.median[channel];
-    (median > 0.0).then(|| log[channel] - median.ln())
 }
 
 /// Number of the frame or the cluster that a bin is held out with.

@@ -40,7 +40,7 @@ impl<'a> Known<'a> {
     }
 
     fn sorted_in(bins: &'a Bins, one_in: usize, coordinates: Coordinates) -> Self {
-        let nodes = half_of_nodes(bins.bins(), one_in, coordinates);
+        let nodes = half_of_nodes(bins, one_in, coordinates);
         Self {
             bins,
             levels: Levels::with_mirror_images(nodes, one_in),

@@ -42,7 +42,7 @@ pub struct Settings {
     /// What cutting may cost, in fine blocks a pair of patches, on average: [`select`] raises the
     /// tolerance to it.
     pub budget: f32,
-    /// Nodes a block.
+    /// Nodes a block; three quarters of them where it may be cut.
     pub nodes: usize,
     /// Of many bins, one in so many is looked at: for [`Known::thinned`].
     pub one_bin_in: usize,
@@ -64,7 +64,7 @@ pub struct Settings {
 pub enum Preset {
     /// A first look.
     Preview,
-    /// Half the work of the default.
+    /// Two thirds of the work of the default.
     Fast,
     /// Accurate to the noise on most materials.
     Default,
@@ -90,8 +90,8 @@ impl Preset {
     pub const fn settings(self) -> Settings {
         let (block_deg, tolerance, budget, nodes, one_bin_in) = match self {
             Preset::Preview => (10.0, f32::INFINITY, 0.0, 64, 8),
-            Preset::Fast => (8.0, 2.0, 2.0, 64, 1),
-            Preset::Default => (8.0, 1.0, 8.0, 128, 1),
+            Preset::Fast => (8.0, 1.0, 3.0, 64, 1),
+            Preset::Default => (8.0, 0.7, 8.0, 128, 1),
             Preset::Best => (8.0, 0.5, f32::INFINITY, 256, 1),
         };
         Settings {
@@ -122,6 +122,15 @@ impl Settings {
     /// Whether pairs of patches may be cut.
     fn cuts(&self) -> bool {
         self.tolerance.is_finite()
+    }
+
+    /// Nodes of a coarse block. Where finer ones may take its place, it needs no more to know where they must.
+    fn coarse_nodes(&self) -> usize {
+        if self.cuts() {
+            3 * self.nodes / 4
+        } else {
+            self.nodes
+        }
     }
 
     /// By how much blending may shift a block in any case, in natural logarithms.

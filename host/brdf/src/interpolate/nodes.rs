@@ -2,7 +2,7 @@
 //! with its reciprocal twin.
 
 use super::coordinates::{Coordinates, Point};
-use crate::bins::{Bin, median};
+use crate::bins::{Bin, Bins, median};
 use rayon::prelude::*;
 
 /// One known value.
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 pub struct Node {
     /// Place.
     pub point: Point,
-    /// Natural logarithm of the bin's median, per channel.
+    /// Natural logarithm of the bin's value, per channel: see [`Bins::log_value`].
     pub log_value: [f32; 3],
     /// Number of samples behind it; less where the value is doubted.
     pub count: f32,
@@ -42,16 +42,16 @@ const FLOOR_SHARE: f32 = 1e-4;
 
 /// A node of one bin in so many, numbered as all bins come: the bin's own or its mirror image (light and view exchanged),
 /// whichever's difference of light and view points to positive x. The others are the mirror images of these.
-pub fn half_of_nodes(bins: &[Bin], one_in: usize, coordinates: Coordinates) -> Vec<Node> {
-    let floor = floor_of(bins.iter());
-    (0..bins.len())
+pub fn half_of_nodes(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec<Node> {
+    let floor = floor_of(bins.bins().iter());
+    (0..bins.bins().len())
         .into_par_iter()
         .step_by(one_in.max(1))
         .map(|number| {
-            let bin = &bins[number];
+            let bin = &bins.bins()[number];
             let node = Node {
                 point: coordinates.point(bin.light.map(f64::from), bin.view.map(f64::from)),
-                log_value: [0, 1, 2].map(|c| bin.median[c].max(floor[c]).ln()),
+                log_value: [0, 1, 2].map(|c| bins.log_value(bin, c, floor[c])),
                 count: bin.count as f32,
                 source: 2 * number as u32,
             };

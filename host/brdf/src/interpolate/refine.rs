@@ -382,10 +382,13 @@ impl Refiner {
     /// A coarse block, through merged nodes, and what it gives at the corners.
     fn fit_whole(&mut self, levels: &impl Neighbours, settings: &Settings, p: &Patch, q: &Patch) {
         let centre = settings.coordinates.point(p.centre, q.centre);
-        levels.around(&centre, settings.nodes, &mut self.found);
+        let nodes = settings.coarse_nodes();
+        levels.around(&centre, nodes, &mut self.found);
         self.trial_at = None;
-        let (found, detail) = (&mut self.found, Detail::Merged);
-        fit(&mut self.whole, levels, settings, detail, centre, found);
+        let radius = keep_nearest(&mut self.found, nodes);
+        let nodes = self.found.iter();
+        let nodes = nodes.map(|(_, k)| levels.node(Detail::Merged, *k));
+        self.whole.fit(nodes, centre, radius, &settings.block());
         write_corners(settings, p, q, &mut self.places);
         self.corners.clear();
         self.whole.evaluate(&self.places, &mut self.corners);
@@ -397,8 +400,10 @@ impl Refiner {
         levels.around(&centre, settings.nodes / 2, &mut self.near);
         keep_nearest(&mut self.near, settings.nodes / 2);
         levels.expand(&centre, &self.near, &mut self.found);
-        let (found, detail) = (&mut self.found, Detail::Bins);
-        fit(&mut self.fine, levels, settings, detail, centre, found);
+        let radius = keep_nearest(&mut self.found, settings.nodes);
+        let nodes = self.found.iter();
+        let nodes = nodes.map(|(_, k)| levels.node(Detail::Bins, *k));
+        self.fine.fit(nodes, centre, radius, &settings.block());
     }
 
     /// A pair of parts in a fine block: its cells and, appended, its corners.
@@ -435,20 +440,6 @@ impl Refiner {
                 .variances_at(&self.places, &mut self.part_variances);
         }
     }
-}
-
-/// Fits a block to the nearest of `found` around a place.
-fn fit(
-    block: &mut BlockSolver,
-    levels: &impl Neighbours,
-    settings: &Settings,
-    detail: Detail,
-    centre: Point,
-    found: &mut Vec<Found>,
-) {
-    let radius = keep_nearest(found, settings.nodes);
-    let nodes = found.iter().map(|(_, k)| levels.node(detail, *k));
-    block.fit(nodes, centre, radius, &settings.block());
 }
 
 /// The cells of a pair of patches, light by light.

@@ -101,7 +101,7 @@ const RESIDUAL_MAX: f32 = 1.0;
 fn square(prediction: &Prediction) -> Option<f64> {
     let lowest = prediction.bin.light[2].min(prediction.bin.view[2]);
     let squares = (0..3)
-        .filter_map(|c| prediction.residual(c))
+        .filter_map(|c| prediction.residual[c])
         .map(|r| f64::from(r.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)).powi(2));
     (f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()).then(|| squares.sum::<f64>() / 3.0)
 }
