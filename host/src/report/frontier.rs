@@ -85,8 +85,11 @@ pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
                 .iter()
                 .filter_map(|k| chart.place(&points[*k]))
                 .collect();
-            let worth_a_name =
-                |k: usize, p: &Point| along.contains(&k) || p.is_default || p.name == "paper";
+            // Blocks between the presets have theirs when pointed at: side by side there is no room.
+            let worth_a_name = |k: usize, p: &Point| {
+                let on_front = along.contains(&k) && p.family != Family::Blocks;
+                on_front || p.is_default || p.name == "paper" || preset_of(&p.name).is_some()
+            };
             let named: Vec<(&Point, String)> = points
                 .iter()
                 .enumerate()
@@ -129,10 +132,17 @@ pub fn images(points: &[Point], title: &str, basis: &str) -> String {
     })
 }
 
+/// The preset that a method is.
+fn preset_of(name: &str) -> Option<Preset> {
+    let contender = |preset: &Preset| Contender::Blocks(preset.settings()).to_string();
+    Preset::ALL
+        .into_iter()
+        .find(|preset| contender(preset) == name)
+}
+
 /// A method's name in few letters: a preset's word, or the size of blocks, their nodes and tolerance.
 fn label(name: &str) -> String {
-    let contender = |preset: &Preset| Contender::Blocks(preset.settings()).to_string();
-    if let Some(preset) = Preset::ALL.iter().find(|preset| contender(preset) == name) {
+    if let Some(preset) = preset_of(name) {
         return preset.name().to_owned();
     }
     let Some(blocks) = name.strip_prefix("blocks=") else {
