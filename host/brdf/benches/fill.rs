@@ -2,7 +2,11 @@
 //! RMS of ln(f/f_true) over missing cells.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--nodes 128] [--tolerance 1] [--budget 4] [--half 1 | --sum 0.5] [--kernel 0.5] [--noise 0.015]`
+//! [--nodes 128] [--tolerance 1] [--budget 4] [--power 0.1] [--kernel 0.3] [--noise 0.015]
+//! [tenth|quick]`
+//!
+//! The poses are the paper's 8505, every tenth of them, or the 925 of the quick demo.
+//! Without `--power` the coordinates are chosen; with it, these are taken.
 
 #![allow(clippy::expect_used)]
 
@@ -11,10 +15,10 @@ mod plan;
 use gonia_brdf::interpolate::hold_out::HoldOut;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Known, Preset, Selection, Settings, fill, fill_with_errors, select,
+    Calibration, Known, Preset, Settings, fill, fill_with_errors, select,
 };
 use gonia_brdf::{Bins, Brdf, Grid};
-use plan::{cpu_seconds, material, measure_with};
+use plan::{Poses, cpu_seconds, material, measure_with};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -31,12 +35,18 @@ fn main() {
     };
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
     let noise = option("--noise", plan::NOISE);
+    let named = |name: &str| arguments.iter().any(|a| a == name);
+    let poses = match (named("tenth"), named("quick")) {
+        (true, _) => Poses::tenth(),
+        (_, true) => Poses::quick(),
+        _ => Poses::paper(),
+    };
     println!(
         "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior grazing  all  void  settings"
     );
     for name in plan::asked(&arguments) {
         let model = material(name);
-        let samples = measure_with(&*model, noise);
+        let samples = measure_with(&*model, noise, &poses);
         let start = Instant::now();
         let bins = Bins::new(grid, &samples);
         let bin_s = start.elapsed().as_secs_f64();
@@ -56,32 +66,11 @@ fn main() {
             nugget_min: option("--nugget", preset.nugget_min.into()) as f32,
             ..preset
         };
-        // Coordinates that are given need not be chosen.
-        let given = |name: &str| arguments.iter().any(|a| a == name);
-        let weight = option("--half", option("--sum", 1.0));
-        let fixed = if given("--half") {
-            Some(Coordinates::half_difference(weight))
-        } else if given("--sum") {
-            Some(Coordinates::sum_difference(weight))
-        } else {
-            None
-        };
         let cpu = cpu_seconds();
         let known = Known::thinned(&bins, base.one_bin_in);
         let sort_s = cpu_seconds() - cpu;
         let cpu = cpu_seconds();
-        let selection = match fixed {
-            None => select(&known, base),
-            Some(coordinates) => Selection {
-                settings: Settings {
-                    coordinates,
-                    kernel_weight: option("--kernel", weight),
-                    noise_variance: (noise * noise) as f32,
-                    ..base
-                },
-                trials: Vec::new(),
-            },
-        };
+        let mut selection = select(&known, base);
         let select_s = cpu_seconds() - cpu;
         for trial in &selection.trials {
             println!(
@@ -90,6 +79,10 @@ fn main() {
                 trial.settings.kernel_weight,
                 trial.log_rms
             );
+        }
+        if arguments.iter().any(|a| a == "--power") {
+            selection.settings.coordinates.power = option("--power", 0.0);
+            selection.settings.kernel_weight = option("--kernel", 0.3);
         }
         let (cpu, start) = (cpu_seconds(), Instant::now());
         let dense = fill(&known, &selection.settings, &|_| ()).expect("enough bins");

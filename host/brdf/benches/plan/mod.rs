@@ -1,7 +1,7 @@
 //! What the benches measure: analytic materials, seen by the paper's plan on the paper's rig.
 
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::hemisphere::{paper_lights, paper_views};
+use gonia_brdf::hemisphere::{directions, paper_lights, paper_views};
 use gonia_brdf::model::{Ggx, Kurt, KurtLobe, Material, Ward};
 use gonia_brdf::{Brdf, Direction, Sample};
 use rayon::prelude::*;
@@ -70,21 +70,63 @@ pub fn material(name: &str) -> Arc<dyn Brdf> {
     })
 }
 
+/// From where a bench measures.
+pub struct Poses {
+    lights: Vec<Direction>,
+    views: Vec<Direction>,
+    /// One in so many of their pairs.
+    one_in: usize,
+}
+
+#[allow(dead_code)] // Some benches need the paper's only.
+impl Poses {
+    /// The paper's 8505.
+    pub fn paper() -> Self {
+        let (lights, views) = (paper_lights(), paper_views());
+        Self {
+            lights,
+            views,
+            one_in: 1,
+        }
+    }
+
+    /// Every tenth of the paper's, of no regular pattern.
+    pub fn tenth() -> Self {
+        Self {
+            one_in: 10,
+            ..Self::paper()
+        }
+    }
+
+    /// The 925 of the quick demo: 37 lights, 25 views.
+    pub fn quick() -> Self {
+        let rings = [(0.0, 1), (25.0, 5), (50.0, 8), (73.0, 11)];
+        let (mut lights, views) = (directions(&rings), directions(&rings));
+        lights.extend(directions(&[(85.0, 12)]));
+        Self {
+            lights,
+            views,
+            one_in: 1,
+        }
+    }
+}
+
 /// The paper's plan on the paper's rig: 8505 frames of 1225 points, with the usual noise.
 #[allow(dead_code)] // One bench has a noise of its own.
 pub fn measure(model: &dyn Brdf) -> Vec<Sample> {
-    measure_with(model, NOISE)
+    measure_with(model, NOISE, &Poses::paper())
 }
 
-/// The same with another noise, relative.
-pub fn measure_with(model: &dyn Brdf, noise: f64) -> Vec<Sample> {
-    let (lights, views) = (paper_lights(), paper_views());
+/// The same with another noise, relative, and from other poses.
+pub fn measure_with(model: &dyn Brdf, noise: f64, poses: &Poses) -> Vec<Sample> {
+    let (lights, views) = (&poses.lights, &poses.views);
     let points: Vec<[f64; 2]> = (-19..=19)
         .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
         .filter(|p| p[0].hypot(p[1]) <= 0.277)
         .collect();
     (0..lights.len() * views.len())
         .into_par_iter()
+        .filter(|frame| frame.is_multiple_of(poses.one_in))
         .flat_map_iter(|frame| {
             let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
             let points = &points;
