@@ -74,8 +74,8 @@ fn main() {
 fn held_out(known: &Known, settings: &Settings, calibration: &Calibration) -> Shares {
     let mut shares = Shares::default();
     for set in 0..HoldOut::sets(known.bins()) {
-        let held_out = HoldOut::new(known, set, 24, 6000).expect("frames to hold out");
-        for p in held_out.predict(settings) {
+        let held_out = HoldOut::new(known.bins(), set, 24, 6000).expect("frames to hold out");
+        for p in held_out.predict(known, settings) {
             let (light, view) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
             for is_within in calibration.covers(&p) {
                 shares.add(light, view, p.weight.into(), is_within);

@@ -74,10 +74,10 @@ fn main() {
         let select_s = cpu_seconds() - cpu;
         for trial in &selection.trials {
             println!(
-                "  tried {:<28} kernel w={:<4} log-RMS {:.4}",
+                "  tried {:<28} kernel w={:<4} log error {:.4}",
                 trial.settings.coordinates.to_string(),
                 trial.settings.kernel_weight,
-                trial.log_rms
+                trial.log_error
             );
         }
         if arguments.iter().any(|a| a == "--power") {
@@ -187,8 +187,8 @@ fn errors(known: &Known, settings: &Settings, model: &dyn Brdf) {
     let (dense, bars) = fill_with_errors(known, settings, &calibration, &|_| ()).expect("bins");
     let fill_s = cpu_seconds() - cpu - calibrate_s;
     println!("  error bars: calibration {calibrate_s:.1} CPU-s, fill {fill_s:.1} CPU-s");
-    let held_out = HoldOut::new(known, 3, 24, 8000).expect("enough frames");
-    let predictions = held_out.predict(settings);
+    let held_out = HoldOut::new(known.bins(), 3, 24, 8000).expect("enough frames");
+    let predictions = held_out.predict(known, settings);
     let share = |keep: &dyn Fn(f64, f64, f64) -> bool| {
         let (mut inside, mut all) = (0, 0);
         for p in &predictions {

@@ -88,8 +88,8 @@ fn held_out_bins_lie_within_their_error_bars() {
         // Other frames than those that the calibration held out.
         let mut shares = [[0.0f32; 2]; 4];
         for set in 0..4 {
-            let held_out = HoldOut::new(&known, set, 24, 4000).unwrap();
-            let predictions = held_out.predict(&settings);
+            let held_out = HoldOut::new(&bins, set, 24, 4000).unwrap();
+            let predictions = held_out.predict(&known, &settings);
             let mut bright: Vec<f32> = predictions.iter().map(|p| p.bin.median[1]).collect();
             bright.sort_by(f32::total_cmp);
             let bright = bright[bright.len() * 9 / 10];
@@ -301,11 +301,12 @@ fn samples_without_frames_are_held_out_by_clusters() {
     let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &samples);
     let known = Known::new(&bins);
     let coordinates = Coordinates::sum_difference(1.0);
-    let held_out = HoldOut::new(&known, 0, 24, 500).unwrap();
-    let predictions = held_out.predict(&Settings {
+    let held_out = HoldOut::new(&bins, 0, 24, 500).unwrap();
+    let settings = Settings {
         coordinates,
         ..Settings::DEFAULT
-    });
+    };
+    let predictions = held_out.predict(&known, &settings);
     assert!(predictions.len() >= 100);
     let near = predictions
         .iter()

@@ -113,12 +113,15 @@ impl Calibration {
     /// Calibrates on bins held out. `None` when too few frames (or clusters of directions) are there
     /// to hold any out.
     pub fn new(known: &Known, settings: &Settings) -> Option<Self> {
-        let sets = HoldOut::sets(known.bins());
+        let bins = known.bins();
+        let sorted = known.sorted_for(settings.coordinates);
+        let known = sorted.as_ref().unwrap_or(known);
+        let sets = HoldOut::sets(bins);
         let mut means = Vec::new();
         for set in 0..sets {
             let set = ONE_IN - 1 - set;
-            if let Some(held_out) = HoldOut::new(known, set, ONE_IN, TESTS / sets as usize) {
-                means.extend(held_out.predict_means(settings));
+            if let Some(held_out) = HoldOut::new(bins, set, ONE_IN, TESTS / sets as usize) {
+                means.extend(held_out.predict_means(known, settings));
             }
         }
         let noise_variance = settings.noise_variance;

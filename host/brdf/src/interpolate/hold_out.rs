@@ -27,7 +27,7 @@ const SETS: u32 = 4;
 
 /// Some bins held out of all.
 pub struct HoldOut<'a> {
-    known: &'a Known<'a>,
+    bins: &'a Bins,
     /// Of each bin, whether it is known.
     training: Vec<bool>,
     /// All that are held out.
@@ -71,8 +71,8 @@ impl<'a> HoldOut<'a> {
     /// Holds out one group of frames (or clusters) in `one_in`, the `set`th choice of several, and of
     /// their bins about `tests`: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
-    pub fn new(known: &'a Known<'a>, set: u32, one_in: u32, tests: usize) -> Option<Self> {
-        let bins = known.bins().bins();
+    pub fn new(all: &'a Bins, set: u32, one_in: u32, tests: usize) -> Option<Self> {
+        let bins = all.bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
         let held_out = |bin: &Bin| {
             hash(group_of(bin, framed))
@@ -92,7 +92,7 @@ impl<'a> HoldOut<'a> {
         let tests = pick(left_out.clone(), tests);
         let trained = training.iter().filter(|known| **known).count();
         (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
-            known,
+            bins: all,
             training,
             left_out,
             framed,
@@ -109,15 +109,16 @@ impl<'a> HoldOut<'a> {
         }
     }
 
-    /// Predicts the tests, by the very blocks that a fill with these settings would use.
-    pub fn predict(&self, settings: &Settings) -> Vec<Prediction<'a>> {
-        let means = self.predict_among(settings, |_| &[]);
+    /// Predicts the tests, by the very blocks that a fill of these known bins (the same that some were held
+    /// out of) with these settings would use.
+    pub fn predict(&self, known: &Known, settings: &Settings) -> Vec<Prediction<'a>> {
+        let means = self.predict_among(known, settings, |_| &[]);
         means.into_iter().map(|mean| mean.first).collect()
     }
 
     /// Predicts the tests together with the other held-out bins of their frames (or clusters) in the same block.
-    pub fn predict_means(&self, settings: &Settings) -> Vec<Mean<'a>> {
-        let grid = self.known.bins().grid();
+    pub fn predict_means(&self, known: &Known, settings: &Settings) -> Vec<Mean<'a>> {
+        let grid = self.bins.grid();
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);
         let key = |bin: &Bin| {
@@ -127,7 +128,7 @@ impl<'a> HoldOut<'a> {
         let mut sorted: Vec<_> = self.left_out.iter().map(|bin| (key(bin), *bin)).collect();
         sorted.sort_by_key(|(key, bin)| (*key, bin.cell));
         let (keys, bins): (Vec<_>, Vec<&Bin>) = sorted.into_iter().unzip();
-        self.predict_among(settings, |bin| {
+        self.predict_among(known, settings, |bin| {
             let key = key(bin);
             let from = keys.partition_point(|k| *k < key);
             let to = keys.partition_point(|k| *k <= key);
@@ -137,13 +138,14 @@ impl<'a> HoldOut<'a> {
 
     fn predict_among<'b>(
         &self,
+        known: &Known,
         settings: &Settings,
         mates: impl Fn(&Bin) -> &'b [&'a Bin] + Sync,
     ) -> Vec<Mean<'a>>
     where
         'a: 'b,
     {
-        let bins = self.known.bins();
+        let bins = self.bins;
         let grid = bins.grid();
         let residual = |bin: &Bin, log: [f32; 3]| {
             [0, 1, 2].map(|c| {
@@ -151,10 +153,10 @@ impl<'a> HoldOut<'a> {
                 (bin.median[c] > 0.0).then(|| log[c] - measured)
             })
         };
-        let sorted = self.known.sorted_for(settings.coordinates);
+        let sorted = known.sorted_for(settings.coordinates);
         let nodes = sorted
             .as_ref()
-            .unwrap_or(self.known)
+            .unwrap_or(known)
             .part(settings.coordinates, |bin| self.training[bin]);
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);

@@ -1,15 +1,14 @@
 //! Which settings suit a material: coordinates by cross-validation over held-out frames, the
 //! tolerance by what cutting may cost.
 
-use super::Settings;
 use super::budget::affordable_tolerance;
 use super::coordinates::Coordinates;
 use super::hold_out::{HoldOut, Prediction};
-use super::known::Known;
+use super::known::{Known, MANY_BINS};
 use super::patches::cover;
+use super::{Preset, Settings};
+use crate::bins::Bins;
 
-/// Held-out bins that are predicted, at most, over all sets.
-const TESTS: usize = 1200;
 /// One frame in so many is held out.
 const HOLD_OUT: u32 = 24;
 /// What competes: the power of the sum's length in the coordinates, and the kernel's weight. The last is for
@@ -25,9 +24,9 @@ const INTERIOR_DEG: f64 = 75.0;
 pub struct Trial {
     /// The settings tried.
     pub settings: Settings,
-    /// RMS of the natural logarithm of predicted over measured in the interior, half of it bright bins, the
-    /// samples' noise included.
-    pub log_rms: f64,
+    /// Natural logarithm of predicted over measured in the interior, half of it bright bins, the samples'
+    /// noise included: RMS, or of few bins the mean absolute value.
+    pub log_error: f64,
 }
 
 /// The outcome of a selection.
@@ -51,36 +50,33 @@ pub fn select(known: &Known, base: Settings) -> Selection {
     if let Some(variance) = bins.noise_variance() {
         settings.noise_variance = variance;
     }
-    let sets = HoldOut::sets(bins);
-    let tests = TESTS / sets as usize;
-    let candidates = CANDIDATES.map(|(power, kernel_weight)| Settings {
-        coordinates: Coordinates {
-            power,
-            ..base.coordinates
-        },
-        kernel_weight,
-        ..settings
-    });
-    let mut squares = CANDIDATES.map(|_| Vec::new());
-    for set in 0..sets {
-        let Some(held_out) = HoldOut::new(known, set, HOLD_OUT, tests) else {
-            continue;
-        };
-        for (candidate, squares) in candidates.iter().zip(&mut squares) {
-            squares.extend(held_out.predict(candidate).iter().filter_map(square));
-        }
-    }
-    let trials: Vec<Trial> = candidates
-        .into_iter()
-        .zip(&squares)
-        .filter(|(_, squares)| !squares.is_empty())
-        .map(|(settings, squares)| Trial {
-            settings,
-            log_rms: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
+    let trying = Trying::of(bins, base);
+    let trials: Vec<Trial> = CANDIDATES
+        .iter()
+        .filter_map(|(power, kernel_weight)| {
+            let tried = Settings {
+                coordinates: Coordinates {
+                    power: *power,
+                    ..base.coordinates
+                },
+                kernel_weight: *kernel_weight,
+                noise_variance: settings.noise_variance,
+                one_bin_in: settings.one_bin_in,
+                ..trying.blocks
+            };
+            let log_error = trying.error(known, &tried)?;
+            Some(Trial {
+                settings: tried,
+                log_error,
+            })
         })
         .collect();
-    if let Some(best) = trials.iter().min_by(|a, b| a.log_rms.total_cmp(&b.log_rms)) {
-        settings = best.settings;
+    if let Some(best) = trials
+        .iter()
+        .min_by(|a, b| a.log_error.total_cmp(&b.log_error))
+    {
+        settings.coordinates = best.settings.coordinates;
+        settings.kernel_weight = best.settings.kernel_weight;
     }
     let cover = cover(bins.grid(), &settings.patch_sizes_deg());
     let sorted = known.sorted_for(settings.coordinates);
@@ -92,16 +88,58 @@ pub fn select(known: &Known, base: Settings) -> Selection {
     Selection { settings, trials }
 }
 
+/// How candidates are tried.
+struct Trying<'a> {
+    /// Sets of frames held out in turn.
+    sets: Vec<HoldOut<'a>>,
+    /// The blocks that predict them.
+    blocks: Settings,
+    /// Errors count by this power.
+    power: f64,
+}
+
+impl<'a> Trying<'a> {
+    /// A few poses see so little of a highlight that a handful of frames would decide by chance, and
+    /// squares would be those of a few bins on its slope: there, every frame is held out once and errors
+    /// count as they are. The coordinates then matter more than the blocks, so all presets try the same.
+    fn of(bins: &'a Bins, base: Settings) -> Self {
+        let few = bins.bins().len() < MANY_BINS;
+        let (sets, tests) = if few { (HOLD_OUT, 200) } else { (1, 1200) };
+        Self {
+            sets: (0..sets)
+                .filter_map(|set| HoldOut::new(bins, set, HOLD_OUT, tests))
+                .collect(),
+            blocks: if few { Preset::Fast.settings() } else { base },
+            power: if few { 1.0 } else { 2.0 },
+        }
+    }
+
+    /// See [`Trial::log_error`]; `None` when there is nothing to hold out.
+    fn error(&self, known: &Known, settings: &Settings) -> Option<f64> {
+        let sorted = known.sorted_for(settings.coordinates);
+        let known = sorted.as_ref().unwrap_or(known);
+        let predictions = self
+            .sets
+            .iter()
+            .flat_map(|set| set.predict(known, settings));
+        let errors: Vec<f64> = predictions
+            .filter(is_interior)
+            .map(|p| {
+                let residuals = p.residual.iter().flatten();
+                let errors = residuals.map(|r| f64::from(r.abs().min(RESIDUAL_MAX)));
+                errors.map(|e| e.powf(self.power)).sum::<f64>() / 3.0
+            })
+            .collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        (!errors.is_empty()).then(|| mean.powf(1.0 / self.power))
+    }
+}
+
 /// A residual beyond this is no better known: an outlier must not decide.
 const RESIDUAL_MAX: f32 = 1.0;
 
-/// Mean square residual of a prediction in the interior. The brightest tenth of the bins are half of the
-/// tests, and count as much: weighed by their number, highlights would not count at all on a plan so
-/// sparse that few frames see them.
-fn square(prediction: &Prediction) -> Option<f64> {
+/// Whether both elevations are below [`INTERIOR_DEG`].
+fn is_interior(prediction: &Prediction) -> bool {
     let lowest = prediction.bin.light[2].min(prediction.bin.view[2]);
-    let squares = (0..3)
-        .filter_map(|c| prediction.residual[c])
-        .map(|r| f64::from(r.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)).powi(2));
-    (f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()).then(|| squares.sum::<f64>() / 3.0)
+    f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()
 }
