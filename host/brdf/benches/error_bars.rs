@@ -13,10 +13,8 @@ use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{Calibration, Known, Origin, Settings, origins, select};
 use gonia_brdf::{Bins, Brdf, Grid};
-use plan::{asked, cpu_seconds, material, measure};
+use plan::{NOISE, Poses, asked, cpu_seconds, material, measure_with};
 
-/// One frame in so many of a sparse plan.
-const SPARSE: u32 = 10;
 /// Pairs of patches whose cells are looked at.
 const PAIRS: usize = 1000;
 /// Cells of each, about.
@@ -51,12 +49,13 @@ fn main() {
     println!("material       held out  interpolated      measured  calibration, CPU-s");
     for name in asked(&arguments) {
         let model = material(name);
-        let mut samples = measure(&*model);
-        let mut grid = Grid::PAPER;
-        if sparse {
-            samples.retain(|s| s.frame.is_multiple_of(SPARSE));
-            grid = Grid::with_step_deg(4.0).expect("a grid step");
-        }
+        let (poses, step) = if sparse {
+            (Poses::tenth(), 4.0)
+        } else {
+            (Poses::paper(), 2.0)
+        };
+        let grid = Grid::with_step_deg(step).expect("a grid step");
+        let samples = measure_with(&*model, NOISE, &poses);
         let bins = Bins::new(grid, &samples);
         drop(samples);
         let known = Known::new(&bins);

@@ -8,7 +8,8 @@ use gonia_brdf::interpolate::nodes::half_of_nodes;
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Known, Origin, Settings, fill, fill_with_errors, origins, select,
+    Calibration, Coordinates, Known, Origin, Preset, Settings, fill, fill_with_errors, origins,
+    select,
 };
 use gonia_brdf::model::{Brdf, Ggx, Kurt, KurtLobe, Ward};
 use gonia_brdf::{Bins, DenseBrdf, Direction, Grid, Sample};
@@ -117,7 +118,7 @@ fn held_out_bins_lie_within_their_error_bars() {
     }
 }
 
-/// Materials that no constant of the error bars was chosen on.
+/// Materials that no constant of the choice or the error bars was found on.
 fn others() -> [Box<dyn Brdf>; 2] {
     [
         Box::new(Ggx {
@@ -314,6 +315,52 @@ fn samples_without_frames_are_held_out_by_clusters() {
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
     assert_eq!(select(&known, Settings::DEFAULT).trials.len(), 4);
+}
+
+#[test]
+fn on_few_poses_presets_choose_alike_and_the_slower_is_the_nearer() {
+    let grid = Grid::with_step_deg(4.0).unwrap();
+    for model in others() {
+        let bins = Bins::new(grid, &measure(&*model));
+        let known = Known::new(&bins);
+        let chosen = [Preset::Preview, Preset::Fast, Preset::Default]
+            .map(|preset| select(&known, preset.settings()).settings);
+        let choice = |s: &Settings| (s.coordinates, s.kernel_weight);
+        assert!(
+            chosen.iter().all(|s| choice(s) == choice(&chosen[0])),
+            "{chosen:?}"
+        );
+        let errors = chosen.map(|settings| {
+            let dense = fill(&known, &settings, &|_| ()).unwrap();
+            interior_error(&dense, &*model)
+        });
+        println!("{errors:?}");
+        assert!(
+            errors.is_sorted_by(|quick, slow| quick > slow),
+            "{errors:?}"
+        );
+    }
+}
+
+/// RMS of ln(f/f_true) where both θ ≤ 75°, of one light in 29.
+fn interior_error(dense: &DenseBrdf, model: &dyn Brdf) -> f64 {
+    let grid = dense.grid();
+    let inside: Vec<usize> = (0..grid.n_directions())
+        .filter(|d| grid.direction(*d).theta_deg() <= 75.0)
+        .collect();
+    let pairs = inside
+        .iter()
+        .step_by(29)
+        .flat_map(|light| inside.iter().map(move |view| (*light, *view)));
+    let squares: Vec<f64> = pairs
+        .map(|(light, view)| {
+            let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
+            (f64::from(dense.at(light, view)[1]) / model.eval(i, v)[1])
+                .ln()
+                .powi(2)
+        })
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 #[test]
