@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
-use gonia::capture::Arms;
-use gonia::link::{Controller, calibrate_axis};
+use gonia_acquire::capture::Arms;
+use gonia_acquire::link::{Controller, calibrate_axis};
 use gonia_protocol::settings::{Axis, Key, MEANINGS};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 use gonia_sim::bench::Bench;

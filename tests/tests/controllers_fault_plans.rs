@@ -4,7 +4,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gonia::capture::{POINTING_LIMIT_DEG, SessionError, SessionSummary, ShotOutcome, run_session};
+use gonia_acquire::capture::{
+    POINTING_LIMIT_DEG, SessionError, SessionSummary, ShotOutcome, run_session,
+};
 use gonia_brdf::Pose;
 use gonia_sim::fault::FaultPlan;
 use gonia_sim::random_faults::{Weather, random_faults};

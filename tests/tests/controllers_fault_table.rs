@@ -9,8 +9,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use gonia::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
-use gonia::link::{Controller, LinkError, calibrate_axis};
+use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
+use gonia_acquire::link::{Controller, LinkError, calibrate_axis};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;

@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use gonia::capture::{
+use gonia_acquire::capture::{
     Arms, POINTING_LIMIT_DEG, SessionError, SessionSummary, ShotOutcome, run_session,
 };
-use gonia::link::{Controller, LinkError};
+use gonia_acquire::link::{Controller, LinkError};
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
@@ -335,7 +335,7 @@ fn one_arms_emergency_stop_stops_the_other_and_is_cleared_from_its_source() {
 fn firmware_of_another_schema_is_named_and_not_moved() {
     /// A transport whose controller answers hello with another schema key.
     struct Elsewhere(Vec<u8>);
-    impl gonia::link::Transport for Elsewhere {
+    impl gonia_acquire::link::Transport for Elsewhere {
         fn send(&mut self, _: &[u8]) -> std::io::Result<()> {
             let identity = gonia_protocol::message::Identity {
                 protocol_min: 1,

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use gonia::link::{Controller, LinkError, StreamTransport, Transport};
+use gonia_acquire::link::{Controller, LinkError, StreamTransport, Transport};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{Arm, Outcome, Refusal, State, Trigger};

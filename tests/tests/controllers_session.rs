@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gonia::capture::{
+use gonia_acquire::capture::{
     Arms, POINTING_LIMIT_DEG, SETTLE_TIME_S, SessionSummary, Shot, ShotOutcome, move_time_s,
     nearest_turn_deg, run_session,
 };

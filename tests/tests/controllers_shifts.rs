@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use gonia::capture::{POINTING_LIMIT_DEG, ShotOutcome, run_session};
+use gonia_acquire::capture::{POINTING_LIMIT_DEG, ShotOutcome, run_session};
 use gonia_protocol::settings::Axis;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
 use gonia_tests::calibrated::{self, BEGIN_US};

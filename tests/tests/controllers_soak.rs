@@ -6,7 +6,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use gonia::link::{Controller, Transport};
+use gonia_acquire::link::{Controller, Transport};
 use gonia_firmware::controller::Controller as Firmware;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::node::{Node, identity};

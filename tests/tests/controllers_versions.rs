@@ -5,7 +5,7 @@
 
 use std::io;
 
-use gonia::link::{Controller, LinkError, Transport};
+use gonia_acquire::link::{Controller, LinkError, Transport};
 use gonia_protocol::frame::{Decoder, encode};
 use gonia_protocol::message::{Arm as Train, Hello, Message, Move, Refusal, Setting, Trigger};
 use gonia_protocol::settings::{Axis, Key};

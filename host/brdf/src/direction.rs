@@ -62,6 +62,16 @@ pub struct Pose {
     pub view: Direction,
 }
 
+impl Pose {
+    /// A pose from θi, φi, θv, φv in degrees.
+    pub fn from_deg([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> Self {
+        Self {
+            light: Direction::from_deg(theta_i, phi_i),
+            view: Direction::from_deg(theta_v, phi_v),
+        }
+    }
+}
+
 /// The unit vector from a point of the sample (x, y in metres; z = 0) to something `distance_m`
 /// from the sample's centre in direction `arm`: eqs. (1) and (2) of the paper in three dimensions.
 pub fn local_direction(arm: Direction, distance_m: f64, point_m: [f64; 2]) -> Vec3 {

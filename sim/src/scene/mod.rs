@@ -9,6 +9,7 @@
 mod light;
 mod noise;
 mod occluder;
+mod of_rig;
 mod optics;
 mod sensor;
 mod target;

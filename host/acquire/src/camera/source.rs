@@ -1,0 +1,110 @@
+//! What a session asks of a camera, whatever it is.
+
+use gonia_formats::FileError;
+use gonia_rig::{Frame, FrameRow};
+
+/// A trigger pulse that was given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pulse {
+    /// How long it was, and so the exposure, seconds.
+    pub exposure_s: f64,
+    /// When it rose, by the clock of the controller that gave it, µs.
+    pub time_us: u64,
+}
+
+impl Pulse {
+    /// With its length and its time.
+    pub fn new(exposure_s: f64, time_us: u64) -> Self {
+        Self {
+            exposure_s,
+            time_us,
+        }
+    }
+}
+
+/// Gives a frame for every shot of a session.
+///
+/// Frames and trigger pulses are matched by count: before each trigger the session says by
+/// [`Camera::ready`] that what came until then belongs to earlier ones. A camera that numbers its
+/// frames and tells their time matches by these too ([`super::matching`]).
+pub trait Camera: Send {
+    /// Maker, model, serial number: what a person would look for in the morning.
+    fn identity(&self) -> String;
+
+    /// Makes ready for the next trigger, and forgets all frames that came before it. Of `strays`
+    /// pulses nobody wants the frames; they may still be on their way, and are waited for. Returns the
+    /// frames found that belong to no pulse at all.
+    ///
+    /// # Errors
+    /// The camera is gone.
+    fn ready(&mut self, strays: usize) -> Result<usize, CameraError>;
+
+    /// The frame of the shot that was triggered last, merged from the exposures of its pulses.
+    ///
+    /// # Errors
+    /// No frame, or one that cannot be used; the shot can be taken again.
+    fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError>;
+
+    /// Opens the camera anew after an error.
+    ///
+    /// # Errors
+    /// It is still gone.
+    fn reopen(&mut self) -> Result<(), CameraError>;
+
+    /// Whether the exposure happens in [`Camera::fetch`], so that the arms must stand still for it.
+    fn exposes_in_fetch(&self) -> bool {
+        false
+    }
+
+    /// Whether the sample on the target changes by itself where a session turns from the reference to
+    /// the material. On a bench a person does that.
+    fn changes_the_sample(&self) -> bool {
+        false
+    }
+}
+
+/// Why there is no frame.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// It did not come in time.
+    #[error(
+        "{came} of {expected} frames came within {timeout_s} s of the trigger; check the camera and its trigger cable"
+    )]
+    Late {
+        /// Frames that came.
+        came: usize,
+        /// Pulses given.
+        expected: usize,
+        /// How long it was waited for, seconds.
+        timeout_s: f64,
+    },
+    /// More frames than pulses.
+    #[error("{came} frames came for {expected} trigger pulses; check the camera's trigger input")]
+    TooMany {
+        /// Frames that came.
+        came: usize,
+        /// Pulses given.
+        expected: usize,
+    },
+    /// Part of a frame was lost on the way.
+    #[error(
+        "frame {frame} of {expected} arrived incomplete ({status}); check the network, its packet size and the socket buffers"
+    )]
+    Incomplete {
+        /// Which, from 1.
+        frame: usize,
+        /// Pulses given.
+        expected: usize,
+        /// In the library's words.
+        status: String,
+    },
+    /// Frames came that are not of the shot's pulses, by their numbers or their times.
+    #[error("the frames are not those of the trigger pulses: {0}; check the trigger cable")]
+    OtherPulse(String),
+    /// It came, and cannot be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Whatever else the camera says.
+    #[error("{0}")]
+    Failed(String),
+}

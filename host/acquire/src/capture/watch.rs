@@ -1,0 +1,71 @@
+//! What a running session tells those who watch it.
+
+use crate::session::PoseDone;
+use gonia_imaging::Registration;
+use gonia_pipeline::process::SampledFrame;
+use gonia_rig::{Frame, Role};
+
+/// Somebody who watches; called from several threads, which wait for it: it must be quick.
+pub trait Watch: Sync {
+    /// Hears what happened.
+    fn tell(&self, news: &Told);
+}
+
+/// What happened.
+#[derive(Clone, Debug)]
+pub enum Told<'a> {
+    /// A role begins, or goes on.
+    Begin {
+        /// What lies on the target.
+        role: Role,
+        /// Poses of the plan that are not done.
+        missing: &'a [usize],
+        /// Poses planned.
+        planned: usize,
+    },
+    /// The arms go to a pose.
+    Going {
+        /// Its place in the plan.
+        index: usize,
+    },
+    /// A frame was looked at, also one that is not kept.
+    Frame {
+        /// Its pixels.
+        frame: &'a Frame,
+        /// Where its marks are.
+        registration: &'a Registration,
+        /// What it showed.
+        sampled: &'a SampledFrame,
+    },
+    /// A pose is done.
+    Pose {
+        /// Its line in the journal.
+        done: &'a PoseDone,
+        /// What it showed.
+        frame: &'a SampledFrame,
+    },
+    /// Poses are done no more, and are taken again.
+    Void(&'a [usize]),
+    /// A pose was given up.
+    GivenUp {
+        /// Its place in the plan.
+        index: usize,
+        /// Why.
+        why: &'a str,
+    },
+    /// The session is held by hand, or goes on.
+    Held(bool),
+    /// Something that a person should know.
+    Event(&'a str),
+}
+
+/// Several who watch.
+pub struct Watchers<'a>(pub Vec<&'a dyn Watch>);
+
+impl Watch for Watchers<'_> {
+    fn tell(&self, news: &Told) {
+        for watch in &self.0 {
+            watch.tell(news);
+        }
+    }
+}

@@ -1,0 +1,516 @@
+//! One arm's controller, as the host knows it.
+
+use std::collections::VecDeque;
+
+use gonia_protocol::frame::{Decoder, encode};
+use gonia_protocol::link::{Patience, Requester, Role, Wish};
+use gonia_protocol::message::{
+    Arm, Completed, Hello, Identity, Latch, LogEntry, Message, Move, Refusal, Setting, SettingName,
+    Status, Telemetry,
+};
+use gonia_protocol::settings::{Axis, Key};
+use gonia_protocol::{NODE_ANY, NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+
+use crate::link::{LinkError, Transport};
+
+/// The lease is renewed this often while something is waited for, µs: an eighth of its
+/// default, since on a bad wire one frame in ten may be lost.
+pub const HEARTBEAT_US: u64 = 250_000;
+/// After so long without news of something accepted, the host asks: the event may be lost.
+const ASK_AFTER_US: u64 = 2_000_000;
+/// Latches kept until somebody takes them.
+const MAX_LATCHES: usize = 64;
+
+/// Something accepted, whose end will be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ticket {
+    request: u16,
+    what: &'static str,
+}
+
+/// A controller behind a transport.
+pub struct Controller {
+    arm: String,
+    transport: Box<dyn Transport>,
+    session: u32,
+    link: Requester,
+    decoder: Decoder,
+    incoming: Vec<u8>,
+    identity: Identity,
+    completed: VecDeque<Completed>,
+    latches: VecDeque<Latch>,
+    telemetry: Option<Telemetry>,
+    last_event: Option<u32>,
+    events_lost: u32,
+    heard_us: u64,
+    asked_us: u64,
+    heartbeat_us: u64,
+}
+
+impl Controller {
+    /// Says hello and checks that both speak the same protocol. `node` is the controller's address,
+    /// or [`NODE_ANY`] for whoever is at the other end.
+    pub fn connect(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
+        let controller = Self::connect_for_service(transport, node)?;
+        controller.check_version()?;
+        Ok(controller)
+    }
+
+    /// Says hello, also to firmware of another protocol. What is not always answered is then refused
+    /// here: who it is, its status, its log and stops are left.
+    pub fn connect_for_service(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
+        let now_us = transport.now_us();
+        let mut controller = Self {
+            arm: name_of(node).to_owned(),
+            transport,
+            // A number that the controller has not heard: the µs at which this session began.
+            session: now_us as u32,
+            link: Requester::new(node, 0, Patience::default()),
+            decoder: Decoder::new(),
+            incoming: Vec::new(),
+            identity: no_identity(),
+            completed: VecDeque::new(),
+            latches: VecDeque::new(),
+            telemetry: None,
+            last_event: None,
+            events_lost: 0,
+            heard_us: now_us,
+            asked_us: now_us,
+            heartbeat_us: now_us,
+        };
+        controller.hello()?;
+        Ok(controller)
+    }
+
+    /// Says hello again, after the controller restarted or the cable was out. Returns whether it
+    /// has restarted since the last time.
+    pub fn reconnect(&mut self) -> Result<bool, LinkError> {
+        let before = self.identity.boot_id;
+        self.hello()?;
+        self.check_version()?;
+        Ok(self.identity.boot_id != before)
+    }
+
+    /// Who it is.
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Its address on the wire.
+    pub fn node(&self) -> u8 {
+        self.link.node()
+    }
+
+    /// What people call it.
+    pub fn name(&self) -> &str {
+        &self.arm
+    }
+
+    /// Now, by the transport's clock, µs.
+    pub fn now_us(&self) -> u64 {
+        self.transport.now_us()
+    }
+
+    /// Events that never arrived, and requests that had to be repeated, so far.
+    pub fn losses(&self) -> (u32, u32) {
+        (self.events_lost, self.link.repeats())
+    }
+
+    /// The newest telemetry.
+    pub fn telemetry(&self) -> Option<&Telemetry> {
+        self.telemetry.as_ref()
+    }
+
+    /// How it is.
+    pub fn status(&mut self) -> Result<Status, LinkError> {
+        match self.ask(&Message::GetStatus, "status")?.1 {
+            Message::Status(status) => Ok(status),
+            _ => Err(self.confused("status")),
+        }
+    }
+
+    /// Homes both axes.
+    pub fn home(&mut self) -> Result<Ticket, LinkError> {
+        self.begin(&Message::Home, "homing")
+    }
+
+    /// Moves both axes to absolute angles, µdeg.
+    pub fn move_to(&mut self, target_udeg: [i32; 2]) -> Result<Ticket, LinkError> {
+        self.begin(&Message::Move(Move { target_udeg }), "a move")
+    }
+
+    /// Makes ready for a trigger train. The ticket ends only on a follower: when it has latched the
+    /// last pulse. Latches of earlier trains are forgotten.
+    pub fn arm(&mut self, arm: Arm) -> Result<Ticket, LinkError> {
+        self.latches.clear();
+        self.begin(&Message::Arm(arm), "arming the trigger")
+    }
+
+    /// Starts the armed train; the ticket ends with its last pulse.
+    pub fn fire(&mut self) -> Result<Ticket, LinkError> {
+        self.begin(&Message::Fire, "the trigger")
+    }
+
+    /// Leaves the armed state.
+    pub fn disarm(&mut self) -> Result<(), LinkError> {
+        self.begin(&Message::Disarm, "disarming").map(drop)
+    }
+
+    /// Decelerates and stops.
+    pub fn stop(&mut self) -> Result<(), LinkError> {
+        self.begin(&Message::Stop, "a stop").map(drop)
+    }
+
+    /// Stops at once, and latches; the other controller stops too.
+    pub fn emergency_stop(&mut self) -> Result<(), LinkError> {
+        self.begin(&Message::EStop, "an emergency stop").map(drop)
+    }
+
+    /// Leaves a latched fault, if its cause is gone.
+    pub fn clear_fault(&mut self) -> Result<(), LinkError> {
+        self.begin(&Message::ClearFault, "clearing the fault")
+            .map(drop)
+    }
+
+    /// The latch of a pulse of the last train: from its event, or asked for where that was lost.
+    pub fn latch(&mut self, pulse: u8) -> Result<Latch, LinkError> {
+        if let Some(latch) = self.latches.iter().find(|latch| latch.pulse == pulse) {
+            return Ok(latch.clone());
+        }
+        match self.ask(&Message::ReadLatch(pulse), "a latch")?.1 {
+            Message::LatchIs(latch) => Ok(latch),
+            _ => Err(self.confused("a latch")),
+        }
+    }
+
+    /// The value of a setting.
+    pub fn setting(&mut self, axis: Axis, key: Key) -> Result<i32, LinkError> {
+        let name = SettingName {
+            axis,
+            key: key.number(),
+        };
+        match self.ask(&Message::GetSetting(name), "a setting")?.1 {
+            Message::SettingIs(setting) => Ok(setting.value),
+            _ => Err(self.confused("a setting")),
+        }
+    }
+
+    /// Changes a setting until the next reset.
+    pub fn set_setting(&mut self, axis: Axis, key: Key, value: i32) -> Result<(), LinkError> {
+        let key = key.number();
+        self.ask(
+            &Message::SetSetting(Setting { axis, key, value }),
+            "a setting",
+        )?;
+        Ok(())
+    }
+
+    /// Writes the settings to the board's memory.
+    pub fn save_settings(&mut self) -> Result<(), LinkError> {
+        self.begin(&Message::SaveSettings, "saving the settings")
+            .map(drop)
+    }
+
+    /// The faults that the controller remembers since it started, newest first.
+    pub fn log(&mut self) -> Result<Vec<LogEntry>, LinkError> {
+        let mut entries = Vec::new();
+        for back in 0..=u8::MAX {
+            match self.ask(&Message::ReadLog(back), "its log")?.1 {
+                Message::LogIs(entry) if entry.fault.is_none() => break,
+                Message::LogIs(entry) => entries.push(entry),
+                _ => return Err(self.confused("its log")),
+            }
+        }
+        Ok(entries)
+    }
+
+    /// Waits a while for something accepted to end; `None` if it has not. Renews the lease.
+    pub fn poll(
+        &mut self,
+        ticket: Ticket,
+        timeout_us: u64,
+    ) -> Result<Option<Completed>, LinkError> {
+        let deadline_us = self.now_us() + timeout_us;
+        loop {
+            self.keep_alive()?;
+            if let Some(at) = self
+                .completed
+                .iter()
+                .position(|c| c.request == ticket.request)
+            {
+                return Ok(self.completed.remove(at));
+            }
+            let now_us = self.now_us();
+            if now_us >= deadline_us {
+                return Ok(None);
+            }
+            if now_us >= self.heard_us.max(self.asked_us) + ASK_AFTER_US {
+                self.ask_whether_ended(ticket)?;
+                continue;
+            }
+            let wait_us = (deadline_us - now_us).min(HEARTBEAT_US);
+            self.listen(wait_us, None)?;
+        }
+    }
+
+    /// Waits until something accepted has ended.
+    pub fn wait(&mut self, ticket: Ticket, limit_us: u64) -> Result<Completed, LinkError> {
+        match self.poll(ticket, limit_us)? {
+            Some(completed) => Ok(completed),
+            None => self.must_have_ended(ticket, limit_us),
+        }
+    }
+
+    /// After waiting for so long in vain: asks, for the event may be lost.
+    pub fn must_have_ended(
+        &mut self,
+        ticket: Ticket,
+        limit_us: u64,
+    ) -> Result<Completed, LinkError> {
+        self.ask_whether_ended(ticket)?;
+        self.poll(ticket, 0)?.ok_or(LinkError::Endless {
+            arm: self.arm.clone(),
+            what: ticket.what,
+            limit_s: limit_us as f64 * 1e-6,
+        })
+    }
+
+    /// Lets time pass, and takes in what arrives.
+    pub fn rest(&mut self, for_us: u64) -> Result<(), LinkError> {
+        let until_us = self.now_us() + for_us;
+        while self.now_us() < until_us {
+            let wait_us = until_us - self.now_us();
+            self.listen(wait_us, None)?;
+        }
+        Ok(())
+    }
+
+    /// Renews the lease, if it is time to.
+    pub fn keep_alive(&mut self) -> Result<(), LinkError> {
+        let now_us = self.now_us();
+        if now_us >= self.heartbeat_us + HEARTBEAT_US {
+            self.heartbeat_us = now_us;
+            // Without a body no message is too long.
+            if let Ok(frame) = encode(self.link.node(), 0, &Message::Heartbeat) {
+                self.send(&frame)?;
+            }
+        }
+        Ok(())
+    }
+
+    // ---- requests ----
+
+    fn hello(&mut self) -> Result<(), LinkError> {
+        let hello = Message::Hello(Hello {
+            session: self.session,
+        });
+        self.last_event = None;
+        self.completed.clear();
+        let (_, answer) = self.ask(&hello, "hello")?;
+        let Message::Identity(identity) = answer else {
+            return Err(self.confused("hello"));
+        };
+        self.identity = identity;
+        Ok(())
+    }
+
+    /// Whether both speak the same protocol.
+    ///
+    /// # Errors
+    /// [`LinkError::Version`]: only who it is, its status, its log and stops can be asked for.
+    pub fn check_version(&self) -> Result<(), LinkError> {
+        let identity = &self.identity;
+        let speaks = identity.protocol_min..=identity.protocol_max;
+        if !speaks.contains(&PROTOCOL_VERSION) || identity.schema_key != SCHEMA_KEY {
+            let [major, minor, patch] = identity.firmware;
+            return Err(LinkError::Version {
+                arm: self.arm.clone(),
+                firmware: format!("{major}.{minor}.{patch} ({})", identity.git),
+                theirs: format!(
+                    "{}-{} schema {:08x}",
+                    speaks.start(),
+                    speaks.end(),
+                    identity.schema_key
+                ),
+                ours: format!("{PROTOCOL_VERSION} schema {SCHEMA_KEY:08x}"),
+            });
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, message: &Message, what: &'static str) -> Result<Ticket, LinkError> {
+        match self.ask(message, what)? {
+            (request, Message::Accepted) => Ok(Ticket { request, what }),
+            _ => Err(self.confused(what)),
+        }
+    }
+
+    /// Sends a request and waits for its answer, repeating it as often as patience allows.
+    fn ask(&mut self, message: &Message, what: &'static str) -> Result<(u16, Message), LinkError> {
+        if !Message::is_always_answered(message.kind()) {
+            self.check_version()?;
+        }
+        let now_us = self.now_us();
+        let Ok((id, frame)) = self.link.begin(message, now_us) else {
+            return Err(self.confused(what));
+        };
+        let frame = frame.to_vec();
+        self.send(&frame)?;
+        // Any request renews the lease.
+        self.heartbeat_us = now_us;
+        loop {
+            let now_us = self.now_us();
+            let wait_us = match self.link.poll(now_us) {
+                Wish::WaitUntil(due_us) => due_us - now_us,
+                Wish::Repeat(frame) => {
+                    let frame = frame.to_vec();
+                    // The zero ends whatever a fault has left open at the other end.
+                    self.send(&[0])?;
+                    self.send(&frame)?;
+                    continue;
+                }
+                Wish::Nothing | Wish::GiveUp => {
+                    return Err(LinkError::NoAnswer {
+                        arm: self.arm.clone(),
+                        what,
+                    });
+                }
+            };
+            match self.listen(wait_us, Some(id))? {
+                None => {}
+                Some(Message::Refused(refusal)) => return Err(self.refused(what, refusal)),
+                Some(answer) => return Ok((id, answer)),
+            }
+        }
+    }
+
+    fn ask_whether_ended(&mut self, ticket: Ticket) -> Result<(), LinkError> {
+        let status = self.status()?;
+        self.asked_us = self.now_us();
+        let known = self.completed.iter().any(|c| c.request == ticket.request);
+        if let Some((request, outcome)) = status.last
+            && request == ticket.request
+            && !known
+        {
+            self.completed.push_back(Completed {
+                seq: 0,
+                request,
+                outcome,
+                encoder_udeg: [0, 1].map(|i| status.axes[i].encoder_udeg),
+                corrections: [0; 2],
+            });
+        }
+        Ok(())
+    }
+
+    // ---- bytes ----
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
+        self.transport
+            .send(bytes)
+            .map_err(|source| LinkError::Port {
+                arm: self.arm.clone(),
+                source,
+            })
+    }
+
+    /// Takes in what arrives; returns the answer to request `id` if it is among it.
+    fn listen(&mut self, timeout_us: u64, id: Option<u16>) -> Result<Option<Message>, LinkError> {
+        let mut bytes = std::mem::take(&mut self.incoming);
+        bytes.clear();
+        let received = self.transport.receive(&mut bytes, timeout_us);
+        let mut answer = None;
+        for &byte in &bytes {
+            let Some(frame) = self.decoder.push(byte) else {
+                continue;
+            };
+            self.heard_us = self.transport.now_us();
+            let role = self.link.sort(&frame.header);
+            match (role, frame.message) {
+                (Role::Event, Ok(event)) => self.take_event(event),
+                (Role::Answer, message) if id == Some(frame.header.request) => {
+                    if self.link.node() == NODE_ANY {
+                        self.link.set_node(frame.header.node);
+                        self.arm = name_of(frame.header.node).to_owned();
+                    }
+                    // A body that cannot be read is an answer too: not the one that was asked for.
+                    answer = Some(message.unwrap_or(Message::Refused(Refusal::NotUnderstood)));
+                }
+                _ => {}
+            }
+        }
+        self.incoming = bytes;
+        match received {
+            Ok(()) => Ok(answer),
+            Err(source) => Err(LinkError::Port {
+                arm: self.arm.clone(),
+                source,
+            }),
+        }
+    }
+
+    fn take_event(&mut self, event: Message) {
+        let seq = match &event {
+            Message::Completed(completed) => completed.seq,
+            Message::Faulted(faulted) => faulted.seq,
+            Message::Telemetry(telemetry) => telemetry.seq,
+            Message::Pulse(latch) => latch.seq,
+            _ => return,
+        };
+        let gap = self
+            .last_event
+            .map_or(0, |last| seq.wrapping_sub(last).wrapping_sub(1));
+        // A number from before the last one: the controller has restarted, and counts anew.
+        let gap = if gap > u32::MAX / 2 { 0 } else { gap };
+        self.events_lost = self.events_lost.saturating_add(gap);
+        self.last_event = Some(seq);
+        match event {
+            Message::Completed(completed) => self.completed.push_back(completed),
+            Message::Telemetry(telemetry) => self.telemetry = Some(telemetry),
+            Message::Pulse(latch) if self.latches.len() < MAX_LATCHES => {
+                self.latches.push_back(latch)
+            }
+            // A fault ends whatever was under way, and that says which fault it was.
+            _ => {}
+        }
+    }
+
+    fn confused(&self, what: &'static str) -> LinkError {
+        LinkError::Confused {
+            arm: self.arm.clone(),
+            what,
+        }
+    }
+
+    fn refused(&self, what: &'static str, refusal: Refusal) -> LinkError {
+        LinkError::Refused {
+            arm: self.arm.clone(),
+            what,
+            refusal,
+        }
+    }
+}
+
+fn name_of(node: u8) -> &'static str {
+    match node {
+        NODE_LIGHT => "light arm",
+        NODE_CAMERA => "camera arm",
+        _ => "controller",
+    }
+}
+
+/// Stands in until the first hello is answered; nobody sees it.
+fn no_identity() -> Identity {
+    Identity {
+        protocol_min: 0,
+        protocol_max: 0,
+        schema_key: 0,
+        firmware: [0; 3],
+        git: Default::default(),
+        board: Default::default(),
+        config_crc: 0,
+        boot_id: 0,
+        reset: gonia_protocol::message::ResetReason::Unknown,
+        last_panic: Default::default(),
+    }
+}

@@ -1,0 +1,10 @@
+//! Speed against accuracy of the arms: sessions on the simulated rig with one setting changed at a
+//! time, and what a limit of jerk would bring.
+
+mod chart;
+mod jerk;
+pub mod sessions;
+
+pub use chart::motion_chart;
+pub use jerk::{JerkRow, jerk_rows};
+pub use sessions::{Factor, MotionRow, motion_rows};

@@ -1,0 +1,328 @@
+//! `gonia capture`: a session on a bench, or on the simulated one.
+
+mod bench;
+mod map;
+mod terminal;
+
+use crate::progress::Progress;
+use crate::{process, table};
+use anyhow::{Context, Result, bail};
+use bench::{Bench, Ports};
+use gonia_acquire::capture::{Capture as Run, Ended, Orders, Watch, Watchers, free_mb};
+use gonia_acquire::session::{
+    Beginning, Claim, ControllerIdentity, End, Entry, Provenance, RIG, SessionFolder, SessionWriter,
+};
+use gonia_brdf::Pose;
+use gonia_formats::frames_csv::write_frames_csv;
+use gonia_formats::plan_csv::read_plan_csv;
+use gonia_formats::rig_toml::read_rig;
+use gonia_formats::samples::write_samples;
+use gonia_formats::{FileError, check_writable};
+use gonia_live::{Listening, LivePage};
+use gonia_plan::Rings;
+use gonia_rig::{Reference, Rig};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use terminal::Terminal;
+
+/// Measures a material: every pose of the plan, its frame, its samples.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/session.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
+)]
+pub struct Capture {
+    /// Folder of the session
+    folder: PathBuf,
+    /// The rig
+    #[arg(long, value_name = "RIG.toml")]
+    rig: PathBuf,
+    /// The poses [default: the paper's plan, in travelling order]
+    #[arg(long, value_name = "PLAN.csv")]
+    plan: Option<PathBuf>,
+    /// Go on with the session in the folder; begin one if there is none
+    #[arg(long)]
+    resume: bool,
+    /// Port of the light arm's controller [default: that of rig.toml]
+    #[arg(long, value_name = "PORT")]
+    light: Option<String>,
+    /// Port of the camera arm's controller [default: that of rig.toml]
+    #[arg(long, value_name = "PORT")]
+    camera_arm: Option<String>,
+    /// Arms and camera of the simulated rig, whatever rig.toml says
+    #[arg(long, conflicts_with_all = ["light", "camera_arm"])]
+    simulated: bool,
+    /// Keep the frames too, as a capture folder
+    #[arg(long)]
+    keep_frames: bool,
+    /// Serve a live page at this address: 127.0.0.1:8080, or port 0 for any that is free
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    serve: Option<SocketAddr>,
+    /// Let other computers see the live page too: --serve may name any address
+    #[arg(long, requires = "serve")]
+    serve_anywhere: bool,
+}
+
+/// The session's folder before the controllers are asked.
+enum Folder {
+    Fresh(Claim),
+    Begun(SessionWriter),
+}
+
+impl Capture {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let rig = read_rig(&self.rig)?;
+        let rig_text =
+            std::fs::read(&self.rig).map_err(|error| FileError::reading(&self.rig, &error))?;
+        let beside = beside(&self.rig, &rig)?;
+        let beside = beside.as_ref().map(|(n, b)| (n.as_str(), b.as_slice()));
+        let settings = rig.session.clone().unwrap_or_default();
+        // A port that is taken is found out before anything is begun.
+        let listening = match self.serve {
+            Some(address) => Some(Listening::at(address, self.serve_anywhere)?),
+            None => None,
+        };
+        let begun = self.resume && SessionFolder::is_session(&self.folder);
+        let (folder, plan) = if begun {
+            let (writer, session) = SessionWriter::resume(&self.folder)?;
+            check_same(&self.folder.join(RIG), &rig_text, &self.rig)?;
+            let plan = session.plan().to_vec();
+            if let Some(path) = &self.plan
+                && read_plan_csv(path)? != plan
+            {
+                bail!(
+                    "{}: is not the plan that the session began with; leave --plan out, or begin a session in another folder",
+                    path.display()
+                );
+            }
+            (Folder::Begun(writer), plan)
+        } else {
+            let claim = Claim::new(&self.folder, beside.map(|b| b.0))?;
+            (Folder::Fresh(claim), self.fresh_plan()?)
+        };
+        let orders = Orders::default();
+        let on_interrupt = orders.clone();
+        ctrlc::set_handler(move || on_interrupt.interrupt())
+            .context("Ctrl-C cannot be caught on this system")?;
+
+        let ports = Ports {
+            light: self.light.as_deref(),
+            camera: self.camera_arm.as_deref(),
+            simulated: self.simulated,
+        };
+        let mut bench = Bench::open(&rig, &self.rig, ports, plan.len(), &settings, &orders)?;
+        if let Some(warning) = bench.arms.calibration_warning()? {
+            eprintln!("warning: {warning}");
+        }
+        bench.check_reach(&plan)?;
+        let provenance = Provenance {
+            program: super::provenance::program(),
+            began: String::new(),
+            rig_crc: String::new(),
+            plan_crc: String::new(),
+            reference: settings.reference,
+            camera: bench.camera.identity(),
+            seed: bench.seed,
+            light_arm: ControllerIdentity::from(bench.arms.light().identity()),
+            camera_arm: ControllerIdentity::from(bench.arms.camera().identity()),
+        };
+        let mut writer = match folder {
+            Folder::Begun(writer) => writer,
+            Folder::Fresh(claim) => claim.begin(Beginning {
+                rig: &rig_text,
+                beside,
+                plan: &plan,
+                provenance: &provenance,
+            })?,
+        };
+        let session = SessionFolder::open(&self.folder)?;
+        check_bench(session.provenance(), &provenance)?;
+        writer.note(&Entry::Start(format!(
+            "{}, light arm {}, camera arm {}",
+            provenance.program, provenance.light_arm.config_crc, provenance.camera_arm.config_crc
+        )))?;
+        if self.keep_frames {
+            check_writable(&self.folder.join("frames"))?;
+        }
+        let terminal = Terminal::new(&session);
+        let live = match listening {
+            Some(listening) => Some(LivePage::serve(listening, &session, &orders)?),
+            None => None,
+        };
+        if let Some(live) = &live {
+            say_where(live);
+        }
+        let watchers: Vec<&dyn Watch> = match &live {
+            Some(live) => vec![&terminal, live],
+            None => vec![&terminal],
+        };
+        let run = Run {
+            rig: session.rig(),
+            settings: &settings,
+            keep_frames: self.keep_frames.then(|| self.folder.clone()),
+            exact: bench.exact,
+            orders: &orders,
+            watch: &Watchers(watchers),
+            free_mb: &free_mb,
+        };
+        let ended = run.run(&mut bench.arms, bench.camera, writer, &session)?;
+        terminal.finish();
+        if let Some(live) = &live {
+            live.end(ended.end, &ended.reason);
+        }
+        self.conclude(&ended)
+    }
+
+    fn fresh_plan(&self) -> Result<Vec<Pose>> {
+        let plan = match &self.plan {
+            Some(path) => read_plan_csv(path)?,
+            None => super::plan::travelling(&Rings::paper()).poses,
+        };
+        if plan.is_empty() {
+            bail!("the plan has no pose: make one with gonia plan");
+        }
+        Ok(plan)
+    }
+
+    /// Samples of what is finished, the table, and the exit code.
+    fn conclude(&self, ended: &Ended) -> Result<()> {
+        let session = SessionFolder::open(&self.folder)?;
+        list_frames(&session)?;
+        table::print(&describe(&session, ended));
+        if ended.end != End::Finished {
+            let (done, planned) = (
+                session.done().count(),
+                session.roles().len() * session.plan().len(),
+            );
+            bail!(
+                "the session has ended after {done} of {planned} poses: {}",
+                ended.reason
+            );
+        }
+        let mut progress = Progress::new();
+        let processed = process::run_on_session(&session, &mut progress)
+            .context("the session is complete, but gives no samples yet")?;
+        write_samples(&self.folder.join("samples.npy"), &processed.samples)?;
+        if !processed.masks.is_empty() {
+            let path = self.folder.join(process::MASKS);
+            processed.masks.write(&path, session.rig())?;
+        }
+        table::print(&process::describe(&processed));
+        Ok(())
+    }
+}
+
+/// Where the live page is. What is behind the # no browser sends on.
+fn say_where(live: &LivePage) {
+    let (address, token) = (live.address(), live.token());
+    eprintln!("live page: http://{address}/#token={token}");
+    eprintln!("without the token the page only shows: http://{address}/");
+}
+
+/// The file that a rig speaks of, beside it.
+fn beside(path: &Path, rig: &Rig) -> Result<Option<(String, Vec<u8>)>, FileError> {
+    let Some(Reference::Table { file, .. }) = &rig.reference else {
+        return Ok(None);
+    };
+    let table = path.with_file_name(file);
+    let bytes = std::fs::read(&table).map_err(|error| FileError::reading(&table, &error))?;
+    Ok(Some((file.clone(), bytes)))
+}
+
+fn check_same(kept: &Path, text: &[u8], given: &Path) -> Result<()> {
+    let begun = std::fs::read(kept).map_err(|error| FileError::reading(kept, &error))?;
+    if begun != text {
+        bail!(
+            "{}: is not the rig that the session began with ({}); restore it, or begin a session in another folder",
+            given.display(),
+            kept.display()
+        );
+    }
+    Ok(())
+}
+
+/// A session goes on with what it began with.
+fn check_bench(began: &Provenance, now: &Provenance) -> Result<()> {
+    for (name, began, now) in [
+        ("light arm", &began.light_arm, &now.light_arm),
+        ("camera arm", &began.camera_arm, &now.camera_arm),
+    ] {
+        if began.config_crc != now.config_crc {
+            bail!(
+                "{name}: its settings ({}) are not those that the session began with ({}); restore them with gonia device, or begin a new session",
+                now.config_crc,
+                began.config_crc
+            );
+        }
+        if (&began.board, &began.firmware) != (&now.board, &now.firmware) {
+            eprintln!(
+                "warning: {name}: the session began with {} {}, and goes on with {} {}",
+                began.board, began.firmware, now.board, now.firmware
+            );
+        }
+    }
+    if began.camera != now.camera {
+        bail!(
+            "the frames come from \"{}\", and those of the session came from \"{}\"; restore [source], or begin a new session",
+            now.camera,
+            began.camera
+        );
+    }
+    Ok(())
+}
+
+/// `frames.csv` of the raw frames that are kept, if any are.
+fn list_frames(session: &SessionFolder) -> Result<()> {
+    let mut rows = session.rows()?;
+    for row in &mut rows {
+        row.file = format!("frames/{}_{:06}.exr", row.role.name(), row.frame);
+    }
+    rows.retain(|row| session.folder().join(&row.file).is_file());
+    if !rows.is_empty() {
+        write_frames_csv(&session.folder().join("frames.csv"), &rows)?;
+    }
+    Ok(())
+}
+
+fn describe(session: &SessionFolder, ended: &Ended) -> Vec<(String, String)> {
+    let planned = session.roles().len() * session.plan().len();
+    let took_s = ended.took.as_secs_f64();
+    let active_s = (ended.took - ended.paused).as_secs_f64().max(1e-9);
+    let mut rows = vec![
+        (
+            "poses".to_owned(),
+            format!("{} of {planned}", session.done().count()),
+        ),
+        (
+            "this run".into(),
+            format!(
+                "{} ({} on the arms' clock), {} shots, {} taken again by the arms and {} for their frames, {} faults got over",
+                table::duration(took_s),
+                table::duration(ended.arms.duration_us as f64 * 1e-6),
+                ended.arms.kept,
+                ended.arms.retakes,
+                ended.retaken,
+                ended.arms.recoveries
+            ),
+        ),
+        (
+            "pointing error".into(),
+            format!(
+                "at most {:.4} degrees by encoder",
+                ended.arms.max_pointing_error_deg
+            ),
+        ),
+    ];
+    // Time on a simulated rig stands still while the host works.
+    if session.provenance().seed.is_none() {
+        rows.push((
+            "arms waited for the host".into(),
+            format!(
+                "{} ({:.2} %)",
+                table::duration(ended.waited.as_secs_f64()),
+                100.0 * ended.waited.as_secs_f64() / active_s
+            ),
+        ));
+    }
+    rows
+}

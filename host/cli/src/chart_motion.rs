@@ -1,0 +1,91 @@
+//! `gonia chart --motion`: the arms' speed against their accuracy.
+
+use crate::plan::travelling;
+use anyhow::Result;
+use gonia_acquire::capture::POINTING_LIMIT_DEG;
+use gonia_acquire::motion::{JerkRow, MotionRow, jerk_rows, motion_chart, motion_rows};
+use gonia_brdf::Pose;
+use gonia_formats::{check_writable, write_whole_bytes};
+use gonia_plan::Rings;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Neighbouring poses of the plan that are run at every value, and how many such stretches.
+const STRETCH: usize = 40;
+const STRETCHES: usize = 10;
+
+/// Runs the sessions, and writes `motion.svg`, `motion.csv` and `jerk.csv`.
+pub fn draw(out: &Path, seed: u64) -> Result<()> {
+    check_writable(out)?;
+    let plan = travelling(&Rings::paper());
+    let poses = plan.poses.len();
+    let rows = motion_rows(&stretches(&plan.poses), seed);
+    let jerk = jerk_rows();
+    let chart = motion_chart(&rows, &jerk, poses, POINTING_LIMIT_DEG);
+    write_whole_bytes(&out.join("motion.svg"), chart.as_bytes())?;
+    let table = csv_of(&rows, poses);
+    write_whole_bytes(&out.join("motion.csv"), table.as_bytes())?;
+    write_whole_bytes(&out.join("jerk.csv"), csv_of_jerk(&jerk).as_bytes())?;
+    print!("{table}");
+    println!(
+        "written: motion.svg, motion.csv and jerk.csv in {}",
+        out.display()
+    );
+    Ok(())
+}
+
+/// Spread evenly over the plan.
+fn stretches(poses: &[Pose]) -> Vec<Vec<Pose>> {
+    let apart = poses.len() / STRETCHES;
+    (0..STRETCHES)
+        .map(|k| poses[k * apart..(k * apart + STRETCH).min(poses.len())].to_vec())
+        .collect()
+}
+
+fn csv_of(rows: &[MotionRow], poses: usize) -> String {
+    let mut csv = "setting,unit,value,default,session_h,pose_s,p50_deg,p99_deg,max_deg,kept,given_up,recoveries,stopped\n".to_owned();
+    for row in rows {
+        let hours = row.pose_s * poses as f64 / 3600.0;
+        let stopped = row
+            .stopped
+            .as_deref()
+            .unwrap_or("")
+            .replace([',', '"', '\n'], ";");
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            csv,
+            "{},{},{},{},{hours:.3},{:.4},{:.5},{:.5},{:.5},{},{},{},{stopped}",
+            row.setting,
+            row.unit,
+            row.value,
+            u8::from(row.is_default),
+            row.pose_s,
+            row.p50_deg,
+            row.p99_deg,
+            row.max_deg,
+            row.kept,
+            row.given_up,
+            row.recoveries,
+        );
+    }
+    csv
+}
+
+fn csv_of_jerk(rows: &[JerkRow]) -> String {
+    let mut csv = "acceleration_deg_s2,rise_ms,default,motion_s,settled_s,slowest_arm_s,own_arm_s,swing_deg\n".to_owned();
+    for row in rows {
+        let _ = writeln!(
+            csv,
+            "{},{},{},{:.4},{:.4},{:.4},{:.4},{:.5}",
+            row.acceleration,
+            row.rise_ms,
+            u8::from(row.is_default),
+            row.motion_s,
+            row.settled_s,
+            row.slowest_s,
+            row.own_s,
+            row.swing_deg
+        );
+    }
+    csv
+}

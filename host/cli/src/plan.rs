@@ -1,0 +1,239 @@
+//! `gonia plan`: what a session will do, without doing it.
+
+use crate::plan_adaptive::{expectation, propose};
+use crate::table;
+use anyhow::{Result, bail};
+use gonia_acquire::capture::keep_out::{Pair, apart_deg, way};
+use gonia_acquire::capture::{SETTLE_TIME_S, move_time_s, nearest_turn_deg};
+use gonia_brdf::{Direction, Pose};
+use gonia_formats::check_writable;
+use gonia_formats::plan_csv::write_plan_csv;
+use gonia_formats::rig_toml::read_rig;
+use gonia_imaging::SamplingGrid;
+use gonia_plan as plan;
+use gonia_plan::{RingList, Rings};
+use gonia_protocol::settings::{Axis, Key};
+use gonia_rig::Rig;
+use std::path::PathBuf;
+
+/// Bytes of a pixel in a frame's file: three half floats.
+const BYTES_A_PIXEL: u64 = 6;
+/// Bytes of a sample in a file: eight floats.
+const BYTES_A_SAMPLE: u64 = 32;
+
+/// Most poses that are proposed at once: ordering them takes the square of their number.
+const ADD_MAX: usize = 5000;
+
+/// Orders the poses, checks them against the arms' limits, and estimates time and disk.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n\nWithout rings it is the paper's plan: 105 lights x 81 views."
+)]
+pub struct Plan {
+    /// The rig
+    rig: PathBuf,
+    /// Where to write the poses (CSV); only a dry run without
+    #[arg(short, long, value_name = "PLAN.csv")]
+    output: Option<PathBuf>,
+    /// Rings of view directions, ELEVATION:COUNT in degrees
+    #[arg(long, value_name = "RINGS")]
+    views: Option<RingList>,
+    /// Rings of light directions
+    #[arg(long, value_name = "RINGS")]
+    lights: Option<RingList>,
+    /// Samples measured so far (several files count together): propose the poses that lower the
+    /// error of `gonia fill` most
+    #[arg(long, value_name = "SAMPLES", num_args = 1.., conflicts_with_all = ["views", "lights"])]
+    adaptive: Vec<PathBuf>,
+    /// How many poses to propose
+    #[arg(long, value_name = "N", default_value_t = 500, requires = "adaptive")]
+    add: usize,
+    /// Seconds a pose for exposures and read-out
+    #[arg(long, value_name = "S", default_value_t = 2.0)]
+    dwell: f64,
+    /// Arms that can touch: leave out poses whose light and view are nearer to each other than this,
+    /// and see how the arms get past each other, in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    keep_out: f64,
+}
+
+impl Plan {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let rig = read_rig(&self.rig)?;
+        if !(0.0..=86_400.0).contains(&self.dwell) {
+            bail!("--dwell {}: must lie in 0..=86400 seconds", self.dwell);
+        }
+        if !(0.0..180.0).contains(&self.keep_out) {
+            bail!("--keep-out {}: must lie in 0..180 degrees", self.keep_out);
+        }
+        if !(1..=ADD_MAX).contains(&self.add) {
+            bail!("--add {}: must lie in 1..={ADD_MAX} poses", self.add);
+        }
+        if let Some(path) = &self.output {
+            check_writable(super::fill::folder_of(path))?;
+        }
+        let (mut plan, proposed) = if self.adaptive.is_empty() {
+            let mut rings = Rings::paper();
+            if let Some(RingList(views)) = self.views {
+                rings.views = views;
+            }
+            if let Some(RingList(lights)) = self.lights {
+                rings.lights = lights;
+            }
+            check_limits(&rings)?;
+            (travelling(&rings), Vec::new())
+        } else {
+            let proposal = propose(&rig, &self.adaptive, self.add, self.keep_out)?;
+            let plan = plan::order(&proposal.poses, &arm_time_s, &arm_time_s);
+            (plan, vec![expectation(proposal.error)])
+        };
+        let apart = (self.keep_out > 0.0).then(|| keep_apart(&mut plan, self.keep_out));
+        let mut rows = estimate(&rig, &plan, self.dwell);
+        rows.extend(proposed);
+        rows.extend(apart.unwrap_or_default());
+        if let Some(path) = &self.output {
+            write_plan_csv(path, &plan.poses)?;
+            rows.push(("written".into(), path.display().to_string()));
+        }
+        table::print(&rows);
+        Ok(())
+    }
+}
+
+/// The plan of some rings in the arms' own travelling times.
+pub fn travelling(rings: &Rings) -> plan::Plan {
+    plan::plan(rings, &arm_time_s, &arm_time_s)
+}
+
+/// Leaves out the poses at which the arms would touch or to which they cannot come, and goes round
+/// where the straight way is not clear; tells how many.
+fn keep_apart(plan: &mut plan::Plan, keep_out_deg: f64) -> Vec<(String, String)> {
+    let axes = |pose: &Pose| [pose.light, pose.view].map(|d| [d.theta_deg(), d.phi_deg()]);
+    let before = plan.poses.len();
+    plan.poses
+        .retain(|pose| apart_deg(&axes(pose)) >= keep_out_deg);
+    let too_near = before - plan.poses.len();
+    let (mut travel_s, mut rounds, mut out_of_reach) = (0.0, 0u64, 0u64);
+    let limit_deg = |key: Key| f64::from(key.default_of(Axis::Phi)) * 1e-6;
+    let limits_deg = [limit_deg(Key::SoftMin), limit_deg(Key::SoftMax)];
+    let mut at: Option<Pair> = None;
+    plan.poses.retain(|pose| {
+        let Some(from) = at else {
+            at = Some(axes(pose));
+            return true;
+        };
+        let mut to = axes(pose);
+        for (to, from) in to.iter_mut().zip(from) {
+            to[1] = nearest_turn_deg(from[1], to[1], limits_deg).unwrap_or(to[1]);
+        }
+        let Some(legs) = way(&from, &to, keep_out_deg) else {
+            out_of_reach += 1;
+            return false;
+        };
+        rounds += u64::from(legs.len() > 1);
+        travel_s += SETTLE_TIME_S * (legs.len() - 1) as f64;
+        travel_s += [from]
+            .iter()
+            .chain(&legs)
+            .zip(&legs)
+            .map(|(a, b)| leg_time_s(a, b))
+            .sum::<f64>();
+        at = Some(to);
+        true
+    });
+    plan.travel_s = travel_s;
+    // They are of all the poses.
+    plan.others = None;
+    let count = |n: u64| table::count(n);
+    vec![
+        (
+            "left out".into(),
+            format!(
+                "{} poses nearer than {keep_out_deg} deg, {} without a clear way",
+                count(too_near as u64),
+                count(out_of_reach)
+            ),
+        ),
+        ("ways round the other arm".into(), count(rounds)),
+    ]
+}
+
+/// The slowest of four axes.
+fn leg_time_s(from: &Pair, to: &Pair) -> f64 {
+    from.iter()
+        .zip(to)
+        .flat_map(|(from, to)| {
+            [(Axis::Theta, 0), (Axis::Phi, 1)].map(|(axis, i)| move_time_s(axis, from[i], to[i]))
+        })
+        .fold(0.0, f64::max)
+}
+
+/// How long an arm takes from one direction to another: its slower axis, φ the shorter way round.
+fn arm_time_s(from: Direction, to: Direction) -> f64 {
+    let turn = (to.phi_deg() - from.phi_deg() + 180.0).rem_euclid(360.0) - 180.0;
+    let theta = move_time_s(Axis::Theta, from.theta_deg(), to.theta_deg());
+    theta.max(move_time_s(Axis::Phi, 0.0, turn))
+}
+
+/// Refuses elevations beyond the controllers' default limits.
+fn check_limits(rings: &Rings) -> Result<()> {
+    let limit_deg = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;
+    for (name, list) in [("light", &rings.lights), ("view", &rings.views)] {
+        if let Some((theta, _)) = list.iter().find(|ring| ring.0 > limit_deg) {
+            bail!(
+                "the {name} ring at {theta} degrees is beyond the arm's limit of {limit_deg} degrees: leave it out"
+            );
+        }
+    }
+    Ok(())
+}
+
+fn estimate(rig: &Rig, plan: &plan::Plan, dwell_s: f64) -> Vec<(String, String)> {
+    let poses = plan.poses.len() as u64;
+    let session_s = plan.travel_s + poses as f64 * (SETTLE_TIME_S + dwell_s);
+    let pixels = (rig.camera.width_px * rig.camera.height_px) as u64;
+    let samples = poses * SamplingGrid::new(rig).points_mm().len() as u64;
+    let mut rows = vec![
+        ("poses".to_owned(), table::count(poses)),
+        ("travelling".into(), table::duration(plan.travel_s)),
+    ];
+    if let Some(others) = plan.others {
+        let row = |name: &str, time_s: f64| {
+            let ratio = ratio(time_s, plan.travel_s);
+            let text = format!("{} ({ratio:.2} x)", table::duration(time_s));
+            (name.to_owned(), text)
+        };
+        rows.push(row("travelling as listed", others.listed_s));
+        rows.push(row("no order is faster than", others.bound_s));
+    }
+    rows.extend([
+        (
+            "session".into(),
+            format!(
+                "{} a material, with {SETTLE_TIME_S} s to settle and {dwell_s} s to expose a pose",
+                table::duration(session_s)
+            ),
+        ),
+        (
+            "frames".into(),
+            format!(
+                "{} a material, if kept",
+                table::bytes(poses * pixels * BYTES_A_PIXEL)
+            ),
+        ),
+        (
+            "samples".into(),
+            format!(
+                "at most {}, {}",
+                table::count(samples),
+                table::bytes(samples * BYTES_A_SAMPLE)
+            ),
+        ),
+    ]);
+    rows
+}
+
+fn ratio(a: f64, b: f64) -> f64 {
+    if b > 0.0 { a / b } else { 1.0 }
+}

@@ -1,0 +1,582 @@
+//! What a session gets over by itself, and what ends it in good order.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+#[path = "common/session.rs"]
+mod session;
+
+use gonia_acquire::camera::{Camera, CameraError, CommandCamera, Pulse, RenderingCamera};
+use gonia_acquire::capture::{Arms, Capture, Ended, Orders, Told, Watch, free_mb};
+use gonia_acquire::session::{End, SessionFolder, SessionWriter, verify};
+use gonia_protocol::settings::Axis;
+use gonia_rig::{Frame, FrameRow, Rig, Thermometer};
+use gonia_sim::bench::Bench;
+use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
+use gonia_sim::rig::SimRig;
+use session::{begin, small_rig};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+const POSES: usize = 12;
+
+/// What the camera does at its calls of `fetch` (counted from 0), when it has seen the first pose so
+/// often before.
+type Trouble = fn(u32, u32) -> Option<Act>;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Act {
+    /// No frame comes.
+    Late,
+    /// A frame that nobody asked for comes after it.
+    Extra,
+    /// The lamp is darker.
+    Dark,
+    /// Something was moved.
+    Moved,
+}
+
+struct Troubled {
+    camera: RenderingCamera,
+    trouble: Trouble,
+    calls: u32,
+    first_pose: u32,
+    extra: usize,
+    changes: bool,
+}
+
+impl Camera for Troubled {
+    fn identity(&self) -> String {
+        "troubled".into()
+    }
+
+    fn ready(&mut self, _: usize) -> Result<usize, CameraError> {
+        Ok(std::mem::take(&mut self.extra))
+    }
+
+    fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
+        let act = (self.trouble)(self.calls, self.first_pose);
+        self.calls += 1;
+        self.first_pose += u32::from(shot.frame == 0);
+        let mut frame = self.camera.fetch(shot, pulses)?;
+        match act {
+            Some(Act::Late) => {
+                return Err(CameraError::Late {
+                    came: 0,
+                    expected: 1,
+                    timeout_s: 0.0,
+                });
+            }
+            Some(Act::Extra) => self.extra = 1,
+            Some(Act::Dark) => {
+                for pixel in &mut frame.rgb {
+                    *pixel = pixel.map(|v| 0.9 * v);
+                }
+            }
+            Some(Act::Moved) => {
+                // The light comes from elsewhere: one side darker, the other brighter.
+                for (i, pixel) in frame.rgb.iter_mut().enumerate() {
+                    let share = 0.5 + (i % 100) as f32 / 100.0;
+                    *pixel = pixel.map(|v| share * v);
+                }
+            }
+            None => {}
+        }
+        Ok(frame)
+    }
+
+    fn reopen(&mut self) -> Result<(), CameraError> {
+        Ok(())
+    }
+
+    fn changes_the_sample(&self) -> bool {
+        self.changes
+    }
+}
+
+struct Nobody;
+
+impl Watch for Nobody {
+    fn tell(&self, _: &Told) {}
+}
+
+fn run(
+    folder: &Path,
+    writer: SessionWriter,
+    faults: FaultPlan,
+    trouble: Trouble,
+    orders: &Orders,
+    changes: bool,
+) -> Ended {
+    let calm = Surroundings::calm(orders);
+    run_with(folder, writer, faults, &calm, |rig, sim| {
+        Box::new(Troubled {
+            camera: RenderingCamera::new(rig, sim, 1, POSES, true),
+            trouble,
+            calls: 0,
+            first_pose: 0,
+            extra: 0,
+            changes,
+        })
+    })
+}
+
+/// What a session has about it, beside its bench.
+struct Surroundings<'a> {
+    orders: &'a Orders,
+    watch: &'a dyn Watch,
+    free_mb: &'a (dyn Fn(&Path) -> Option<u64> + Sync),
+    keep_frames: bool,
+}
+
+impl<'a> Surroundings<'a> {
+    fn calm(orders: &'a Orders) -> Self {
+        Self {
+            orders,
+            watch: &Nobody,
+            free_mb: &free_mb,
+            keep_frames: false,
+        }
+    }
+}
+
+fn run_with(
+    folder: &Path,
+    writer: SessionWriter,
+    faults: FaultPlan,
+    surroundings: &Surroundings,
+    camera: impl FnOnce(&Rig, SimRig) -> Box<dyn Camera>,
+) -> Ended {
+    let session = SessionFolder::open(folder).unwrap();
+    let rig = session.rig().clone();
+    let arms = [(); 2].map(|()| Bench::quiet_arm_near_home());
+    let sim = SimRig::with_arms(1, faults, arms);
+    let mut arms = Arms::connect(
+        Box::new(sim.port(Arm::Light)),
+        Box::new(sim.port(Arm::Camera)),
+    )
+    .unwrap();
+    let capture = Capture {
+        rig: &rig,
+        settings: rig.session.as_ref().unwrap(),
+        keep_frames: surroundings.keep_frames.then(|| folder.to_owned()),
+        exact: true,
+        orders: surroundings.orders,
+        watch: surroundings.watch,
+        free_mb: surroundings.free_mb,
+    };
+    let camera = camera(&rig, sim);
+    capture.run(&mut arms, camera, writer, &session).unwrap()
+}
+
+/// A session of the material alone under some trouble; its folder, and how it ended.
+fn under(trouble: Trouble, faults: FaultPlan) -> (tempfile::TempDir, Ended) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().reference = false;
+    let writer = begin(folder.path(), &rig, POSES);
+    let orders = Orders::default();
+    let ended = run(folder.path(), writer, faults, trouble, &orders, true);
+    (folder, ended)
+}
+
+/// The frames' checksums, by pose.
+fn crcs(folder: &Path) -> Vec<(usize, u32)> {
+    let session = SessionFolder::open(folder).unwrap();
+    session.done().map(|p| (p.index, p.crc)).collect()
+}
+
+fn quiet(_: u32, _: u32) -> Option<Act> {
+    None
+}
+
+fn journal(folder: &Path) -> String {
+    std::fs::read_to_string(folder.join("journal.log")).unwrap()
+}
+
+#[test]
+fn missing_and_extra_frames_are_noticed_and_their_poses_taken_again() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    let (folder, ended) = under(
+        |call, _| match call {
+            2 => Some(Act::Late),
+            6 => Some(Act::Extra),
+            _ => None,
+        },
+        FaultPlan::default(),
+    );
+    assert_eq!(
+        (ended.end, ended.retaken),
+        (End::Finished, 2),
+        "{}",
+        ended.reason
+    );
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert!(
+        text.contains("0 of 1 frames came") && text.contains("belong to no trigger"),
+        "{text}"
+    );
+}
+
+#[test]
+fn poses_measured_under_a_darker_lamp_are_measured_again_when_it_is_back() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    // The lamp comes back after the second look at the control pose.
+    let (folder, ended) = under(
+        |call, first_pose| (call > 3 && first_pose < 3).then_some(Act::Dark),
+        FaultPlan::default(),
+    );
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert!(
+        text.contains(" void since=") && text.contains("the lamp has drifted"),
+        "{text}"
+    );
+    assert_eq!(verify(folder.path()).unwrap().broken().count(), 0);
+}
+
+#[test]
+fn a_lamp_that_stays_dark_a_moved_sample_and_a_dead_camera_end_the_session_with_their_reason() {
+    for (trouble, said) in [
+        (
+            (|call, _| (call > 3).then_some(Act::Dark)) as Trouble,
+            "the lamp stays other",
+        ),
+        (
+            |call, _| (call > 3).then_some(Act::Moved),
+            "the control pose is not what it was",
+        ),
+        (
+            |call, _| (call > 3).then_some(Act::Late),
+            "tried 4 times in vain",
+        ),
+    ] {
+        let (folder, ended) = under(trouble, FaultPlan::default());
+        assert_eq!(ended.end, End::Failed, "{said}: {}", ended.reason);
+        assert!(ended.reason.contains(said), "{}", ended.reason);
+        let text = journal(folder.path());
+        assert!(
+            text.lines().last().unwrap().contains("stop failed"),
+            "{text}"
+        );
+        // Nothing doubtful was kept: what is there is what a calm session has.
+        let (calm, _) = under(quiet, FaultPlan::default());
+        let expected = crcs(calm.path());
+        assert!(
+            crcs(folder.path())
+                .iter()
+                .all(|pose| expected.contains(pose))
+        );
+    }
+}
+
+#[test]
+fn a_fault_and_a_cable_that_was_out_are_got_over() {
+    let (calm, clear) = under(quiet, FaultPlan::default());
+    let middle_us = clear.arms.duration_us / 2;
+    let at = |us, fault| FaultEvent {
+        at_us: us,
+        arm: Arm::Camera,
+        fault,
+    };
+    let lost = Fault::EncoderLost {
+        axis: Axis::Theta,
+        for_us: 300_000,
+    };
+    let plan = FaultPlan {
+        events: vec![
+            at(middle_us, lost),
+            at(
+                middle_us + 20_000_000,
+                Fault::Unplugged { for_us: 5_000_000 },
+            ),
+        ],
+        ..FaultPlan::default()
+    };
+    let (folder, ended) = under(quiet, plan);
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert!(ended.arms.recoveries > 0);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+}
+
+#[test]
+fn a_full_disk_ends_the_session_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().disk_reserve_mb = u64::MAX / 2;
+    let writer = begin(folder.path(), &rig, POSES);
+    let orders = Orders::default();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(ended.end, End::Failed);
+    assert!(ended.reason.contains("MB are reserved"), "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), []);
+}
+
+#[test]
+fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = begin(folder.path(), &small_rig(), POSES);
+    let orders = Orders::default();
+    let first = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        false,
+    );
+    assert_eq!(first.end, End::Paused);
+    assert!(first.reason.contains("put the material on the target"));
+    assert_eq!(verify(folder.path()).unwrap().done, POSES);
+    let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
+    let second = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        false,
+    );
+    assert_eq!(second.end, End::Finished, "{}", second.reason);
+    assert_eq!(verify(folder.path()).unwrap().done, 2 * POSES);
+}
+
+#[test]
+fn orders_end_a_session_and_it_goes_on_from_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let writer = begin(folder.path(), &small_rig(), POSES);
+    let orders = Orders::default();
+    orders.interrupt();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(
+        (ended.end, ended.reason.as_str()),
+        (End::Paused, "by Ctrl-C")
+    );
+    let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
+    let orders = Orders::default();
+    let ended = run(
+        folder.path(),
+        writer,
+        FaultPlan::default(),
+        quiet,
+        &orders,
+        true,
+    );
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+}
+
+fn calm_camera(rig: &Rig, sim: SimRig) -> Box<dyn Camera> {
+    Box::new(RenderingCamera::new(rig, sim, 1, POSES, true))
+}
+
+#[test]
+fn a_session_goes_on_by_itself_when_a_full_disk_has_room_again() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    let settings = rig.session.as_mut().unwrap();
+    (settings.reference, settings.disk_reserve_mb) = (false, 500);
+    let writer = begin(folder.path(), &rig, POSES);
+    // Full from the fourth look on, for as long as one may wait.
+    let looks = AtomicU32::new(0);
+    let free_mb = |_: &Path| match looks.fetch_add(1, Ordering::SeqCst) {
+        3..6 => Some(499),
+        _ => Some(500),
+    };
+    let orders = Orders::default();
+    let surroundings = Surroundings {
+        free_mb: &free_mb,
+        ..Surroundings::calm(&orders)
+    };
+    let none = FaultPlan::default();
+    let ended = run_with(folder.path(), writer, none, &surroundings, calm_camera);
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert_eq!(
+        text.matches("the disk has 499 MB left").count(),
+        3,
+        "{text}"
+    );
+}
+
+/// Somebody who opens the window when it is too warm.
+struct Airing<'a> {
+    reading: &'a Path,
+    heard: Mutex<Vec<String>>,
+    degrees: &'a str,
+}
+
+impl Watch for Airing<'_> {
+    fn tell(&self, news: &Told) {
+        match news {
+            // Warm after the third pose.
+            Told::Pose { done, .. } if done.index == 2 => {
+                std::fs::write(self.reading, "31.5").unwrap();
+            }
+            Told::Event(text) => {
+                self.heard.lock().unwrap().push((*text).to_owned());
+                std::fs::write(self.reading, self.degrees).unwrap();
+            }
+            _ => {}
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_session_waits_while_it_is_too_warm_and_looks_at_the_control_pose_after_it() {
+    for (degrees, end, looks) in [("22", End::Finished, 1), ("31.4", End::Failed, 3)] {
+        let folder = tempfile::tempdir().unwrap();
+        let place = tempfile::tempdir().unwrap();
+        let reading = place.path().join("degrees");
+        std::fs::write(&reading, "21.5").unwrap();
+        let mut rig = small_rig();
+        let settings = rig.session.as_mut().unwrap();
+        (settings.reference, settings.control_every) = (false, 1000);
+        settings.thermometer = Some(Thermometer {
+            run: vec!["cat".into(), reading.to_str().unwrap().into()],
+            limits_c: [18.0, 26.0],
+            every_s: 0.0,
+        });
+        let writer = begin(folder.path(), &rig, POSES);
+        let airing = Airing {
+            reading: &reading,
+            heard: Mutex::default(),
+            degrees,
+        };
+        let orders = Orders::default();
+        let surroundings = Surroundings {
+            watch: &airing,
+            ..Surroundings::calm(&orders)
+        };
+        let none = FaultPlan::default();
+        let ended = run_with(folder.path(), writer, none, &surroundings, calm_camera);
+        assert_eq!(ended.end, end, "{}", ended.reason);
+        let heard = airing.heard.into_inner().unwrap();
+        assert_eq!(heard.len(), looks, "{heard:?}");
+        assert!(
+            heard[0].contains("31.5 degrees C, and 18 to 26"),
+            "{heard:?}"
+        );
+        let text = journal(folder.path());
+        if end == End::Finished {
+            // Once after the warmth, once at the end.
+            assert_eq!(text.matches(" control ").count(), 2, "{text}");
+            assert_eq!(crcs(folder.path()).len(), POSES);
+        } else {
+            assert!(ended.reason.contains("31.4 degrees C"), "{}", ended.reason);
+        }
+    }
+}
+
+/// The samples of every pose, in order.
+fn values(folder: &Path) -> Vec<Vec<Option<[f32; 3]>>> {
+    let session = SessionFolder::open(folder).unwrap();
+    let frames = session.done().map(|pose| session.frame(pose).unwrap());
+    frames
+        .map(|frame| {
+            frame
+                .points
+                .iter()
+                .map(|p| p.as_ref().ok().map(|p| p.rgb))
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+#[cfg(unix)]
+fn a_whole_session_whose_frames_a_program_takes() {
+    // What the program hands out: the frames of a session before.
+    let before = tempfile::tempdir().unwrap();
+    let writer = begin(before.path(), &small_rig(), POSES);
+    std::fs::create_dir(before.path().join("frames")).unwrap();
+    let orders = Orders::default();
+    let surroundings = Surroundings {
+        keep_frames: true,
+        ..Surroundings::calm(&orders)
+    };
+    let none = FaultPlan::default();
+    let ended = run_with(before.path(), writer, none, &surroundings, |rig, sim| {
+        Box::new(Troubled {
+            camera: RenderingCamera::new(rig, sim, 1, POSES, true),
+            trouble: quiet,
+            calls: 0,
+            first_pose: 0,
+            extra: 0,
+            changes: true,
+        })
+    });
+    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = Some(begin(folder.path(), &small_rig(), POSES));
+    let frames = before.path().join("frames");
+    // It fails once in the middle of the material, and leaves nothing once.
+    let script = "n=$(printf %06d $2); cd \"$0\"; \
+        if [ $1$2 = material5 ] && mkdir failed; then exit 3; fi; \
+        if [ $1$2 = material6 ] && mkdir empty; then exit 0; fi; \
+        cp $1_$n.exr \"$3.exr\"";
+    let program = [
+        "sh",
+        "-c",
+        script,
+        frames.to_str().unwrap(),
+        "{role}",
+        "{index}",
+        "{file}",
+    ];
+    let mut retaken = 0;
+    for end in [End::Paused, End::Finished] {
+        let writer = match writer.take() {
+            Some(writer) => writer,
+            // The material lies there now.
+            None => SessionWriter::resume(folder.path()).unwrap().0,
+        };
+        let ended = run_with(
+            folder.path(),
+            writer,
+            FaultPlan::default(),
+            &Surroundings::calm(&orders),
+            |rig, _| {
+                let program = program.map(str::to_owned).to_vec();
+                Box::new(CommandCamera::new(rig, program, 20.0))
+            },
+        );
+        assert_eq!(ended.end, end, "{}", ended.reason);
+        retaken += ended.retaken;
+    }
+    assert_eq!(retaken, 2);
+    let text = journal(folder.path());
+    assert!(
+        text.contains("the program sh ended with exit status: 3"),
+        "{text}"
+    );
+    assert!(text.contains("left 0 files where 1 are due"), "{text}");
+    let (taken, given) = (values(folder.path()), values(before.path()));
+    assert_eq!((taken.len(), given.len()), (2 * POSES, 2 * POSES));
+    for (a, b) in taken.iter().flatten().zip(given.iter().flatten()) {
+        // Frames in files are half floats.
+        let near = match (a, b) {
+            (Some(a), Some(b)) => (0..3).all(|c| (a[c] / b[c] - 1.0).abs() < 1e-3),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        assert!(near, "{a:?} {b:?}");
+    }
+}

@@ -1,0 +1,262 @@
+//! Three planes R, G, B of an EXR file: what frames and dense BRDFs have in common.
+
+use crate::{FileError, write_whole};
+use exr::meta::attribute::{AttributeValue, SampleType};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
+    MetaData, ReadChannels, ReadLayers, Text, WritableImage, f16,
+};
+use half::slice::HalfFloatSliceExt;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+
+/// The colour channels, in the order of every `[_; 3]` of this crate.
+const NAMES: [&str; 3] = ["R", "G", "B"];
+
+/// Three planes of one file, row by row from the top left.
+pub(super) struct ExrPlanes {
+    pub width: usize,
+    pub height: usize,
+    pub planes: [Plane; 3],
+    /// A channel beside R, G and B, by name: written, never read.
+    pub extra: Option<(&'static str, Plane)>,
+    /// The text attributes of the file, by name.
+    pub attributes: BTreeMap<String, String>,
+}
+
+/// One channel in the precision of the file.
+pub(super) enum Plane {
+    F16(Vec<f16>),
+    F32(Vec<f32>),
+}
+
+impl Plane {
+    /// Copies values from `start` on into `out`.
+    pub fn copy_to(&self, start: usize, out: &mut [f32]) {
+        match self {
+            Plane::F32(values) => out.copy_from_slice(&values[start..start + out.len()]),
+            Plane::F16(values) => values[start..start + out.len()].convert_to_f32_slice(out),
+        }
+    }
+
+    /// In single precision; moved, not copied, where it already is.
+    pub fn into_f32(self) -> Vec<f32> {
+        match self {
+            Plane::F32(values) => values,
+            Plane::F16(values) => values.into_iter().map(f16::to_f32).collect(),
+        }
+    }
+}
+
+impl From<Plane> for FlatSamples {
+    fn from(plane: Plane) -> Self {
+        match plane {
+            Plane::F16(values) => FlatSamples::F16(values),
+            Plane::F32(values) => FlatSamples::F32(values),
+        }
+    }
+}
+
+/// Reads the R, G and B planes of a file. `check` sees the size before anything large is
+/// allocated, and may refuse it with (problem, remedy).
+pub(super) fn read(
+    path: &Path,
+    check: impl FnOnce(usize, usize) -> Result<(), (String, String)>,
+) -> Result<ExrPlanes, FileError> {
+    let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, &error))?;
+    let [header] = meta.headers.as_slice() else {
+        return Err(FileError::new(
+            path,
+            format_args!("holds {} images", meta.headers.len()),
+            "keep one image a file",
+        ));
+    };
+    if header.deep {
+        return Err(FileError::new(
+            path,
+            "holds deep data",
+            "save it as a flat image",
+        ));
+    }
+    for name in NAMES {
+        let channel = header
+            .channels
+            .list
+            .iter()
+            .find(|channel| channel.name.eq(name));
+        let Some(channel) = channel else {
+            return Err(missing_channel(path, name, header));
+        };
+        if channel.sample_type == SampleType::U32 {
+            return Err(FileError::new(
+                path,
+                "holds 32-bit integers",
+                "save it as half or float, linear radiance",
+            )
+            .at(format_args!("channel {name}")));
+        }
+        if channel.sampling != exr::math::Vec2(1, 1) {
+            return Err(
+                FileError::new(path, "is subsampled", "save every pixel of it")
+                    .at(format_args!("channel {name}")),
+            );
+        }
+    }
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    check(width, height).map_err(|(problem, remedy)| FileError::new(path, problem, remedy))?;
+    let attributes = text_attributes(header);
+
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|error| unreadable(path, &error))?;
+    let planes = take_planes(path, image.layer_data.channel_data)?;
+    Ok(ExrPlanes {
+        width,
+        height,
+        planes,
+        extra: None,
+        attributes,
+    })
+}
+
+fn missing_channel(path: &Path, name: &str, header: &exr::meta::header::Header) -> FileError {
+    let there: Vec<String> = header
+        .channels
+        .list
+        .iter()
+        .map(|channel| channel.name.to_string())
+        .collect();
+    FileError::new(
+        path,
+        format_args!("has no channel {name}, only {}", there.join(", ")),
+        "save it as RGB, with channels R, G and B",
+    )
+}
+
+/// The text attributes of a file, by name.
+pub(super) fn text_attributes(header: &exr::meta::header::Header) -> BTreeMap<String, String> {
+    let own = header.own_attributes.other.iter();
+    own.chain(&header.shared_attributes.other)
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            _ => None,
+        })
+        .collect()
+}
+
+fn unreadable(path: &Path, error: &exr::error::Error) -> FileError {
+    match error {
+        exr::error::Error::Io(error) => FileError::reading(path, error),
+        exr::error::Error::NotSupported(what) => FileError::new(
+            path,
+            format_args!("is an EXR of a kind that is not read ({what})"),
+            "save it as a flat RGB image",
+        ),
+        error => FileError::new(
+            path,
+            format_args!("is not an EXR, or is cut short or damaged ({error})"),
+            "copy or make it again",
+        ),
+    }
+}
+
+/// Writes three planes as one uncompressed image, whole, and gives them back. Attribute texts keep
+/// letters outside of Latin-1, which an EXR cannot hold, as `\u{…}`.
+pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileError> {
+    let ExrPlanes {
+        width,
+        height,
+        planes,
+        extra,
+        attributes,
+    } = image;
+    let [r, g, b] = planes.map(FlatSamples::from);
+    let extra = extra.map(|(name, plane)| (name, FlatSamples::from(plane)));
+    let layer_attributes = layer_attributes(path, &attributes)?;
+    let encoding = Encoding {
+        compression: Compression::Uncompressed,
+        ..Encoding::UNCOMPRESSED
+    };
+    let channels = AnyChannels::sort(
+        [("R", r), ("G", g), ("B", b)]
+            .into_iter()
+            .chain(extra)
+            .map(|(name, samples)| AnyChannel::new(name, samples))
+            .collect(),
+    );
+    let image = Image::from_layer(Layer::new(
+        (width, height),
+        layer_attributes,
+        encoding,
+        channels,
+    ));
+    write_whole(path, |file| {
+        image
+            .write()
+            .to_buffered(file)
+            .map_err(|error| match error {
+                exr::error::Error::Io(error) => error,
+                other => io::Error::other(other.to_string()),
+            })
+    })?;
+    take_planes(path, image.layer_data.channel_data)
+}
+
+/// The attributes of a file, the program's name among them.
+pub(super) fn layer_attributes(
+    path: &Path,
+    attributes: &BTreeMap<String, String>,
+) -> Result<LayerAttributes, FileError> {
+    let mut layer = LayerAttributes {
+        software_name: Text::new_or_none(concat!("gonia ", env!("CARGO_PKG_VERSION"))),
+        ..LayerAttributes::default()
+    };
+    for (name, value) in attributes {
+        let texts = Text::new_or_none(name).zip(Text::new_or_none(latin(value)));
+        let Some((name, value)) = texts else {
+            return Err(FileError::new(
+                path,
+                format_args!("\"{name}\" cannot be the name of an attribute"),
+                "name it with 1 to 255 Latin letters",
+            ));
+        };
+        layer.other.insert(name, AttributeValue::Text(value));
+    }
+    Ok(layer)
+}
+
+/// The planes R, G and B out of an image, without copying them.
+fn take_planes(path: &Path, channels: AnyChannels<FlatSamples>) -> Result<[Plane; 3], FileError> {
+    let mut list = channels.list;
+    let mut take = |name: &str| {
+        let place = list.iter().position(|channel| channel.name.eq(name));
+        match place.map(|place| list.remove(place).sample_data) {
+            Some(FlatSamples::F16(values)) => Ok(Plane::F16(values)),
+            Some(FlatSamples::F32(values)) => Ok(Plane::F32(values)),
+            Some(FlatSamples::U32(_)) | None => Err(FileError::new(
+                path,
+                "changed while it was read",
+                "try again",
+            )),
+        }
+    };
+    Ok([take("R")?, take("G")?, take("B")?])
+}
+
+fn latin(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if u32::from(letter) < 256 {
+            kept.push(letter);
+        } else {
+            kept.extend(letter.escape_unicode());
+        }
+    }
+    kept
+}

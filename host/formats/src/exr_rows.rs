@@ -1,0 +1,292 @@
+//! An uncompressed RGB float EXR written and read row by row, in any order: for images that do not fit
+//! memory, for a few values of a large one, and for all of them by several threads.
+//!
+//! Such a file is a header, a table of 8-byte offsets, and for each row its number and its length (two
+//! 4-byte integers) before the values of B, G and R, all little-endian.
+
+use crate::exr_planes::{layer_attributes, text_attributes};
+use crate::{FileError, write_whole};
+use exr::compression::Compression;
+use exr::io::PeekRead;
+use exr::math::Vec2;
+use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
+use exr::meta::header::Header;
+use exr::meta::{BlockDescription, MetaData, Requirements, magic_number};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// The channels in the order of the file, and where each is in `[_; 3]`.
+const CHANNELS: [(&str, usize); 3] = [("B", 2), ("G", 1), ("R", 0)];
+/// Bytes before the values of a row.
+const ROW_HEAD: u64 = 8;
+
+/// A file being written.
+pub(super) struct RowWriter<'a> {
+    file: Mutex<&'a mut BufWriter<File>>,
+    /// Where row 0 begins.
+    start: u64,
+    width: usize,
+}
+
+impl RowWriter<'_> {
+    /// Writes a row, from any thread. Each is to be written once.
+    pub fn write(&self, row: usize, values: [&[f32]; 3]) -> io::Result<()> {
+        let size = 12 * self.width;
+        let mut bytes = Vec::with_capacity(ROW_HEAD as usize + size);
+        bytes.extend((row as i32).to_le_bytes());
+        bytes.extend((size as i32).to_le_bytes());
+        for (_, channel) in CHANNELS {
+            bytes.extend(values[channel].iter().flat_map(|v| v.to_le_bytes()));
+        }
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(
+            self.start + row as u64 * (ROW_HEAD + size as u64),
+        ))?;
+        file.write_all(&bytes)
+    }
+}
+
+/// Writes a square image whole; `fill` gives its rows.
+pub(super) fn write_rows(
+    path: &Path,
+    side: usize,
+    attributes: &BTreeMap<String, String>,
+    fill: impl FnOnce(&RowWriter<'_>) -> io::Result<()>,
+) -> Result<(), FileError> {
+    let own = layer_attributes(path, attributes)?;
+    let channels = CHANNELS
+        .iter()
+        .map(|(name, _)| ChannelDescription::named(*name, SampleType::F32))
+        .collect();
+    let header = Header::new(Text::default(), (side, side), channels)
+        .with_encoding(
+            Compression::Uncompressed,
+            BlockDescription::ScanLines,
+            LineOrder::Increasing,
+        )
+        .with_attributes(own);
+    write_whole(path, |file| {
+        let exr = |error: exr::error::Error| match error {
+            exr::error::Error::Io(error) => error,
+            other => io::Error::other(other.to_string()),
+        };
+        magic_number::write(file).map_err(exr)?;
+        let headers = [header];
+        let requirements = MetaData::validate(&headers, true).map_err(exr)?;
+        requirements.write(file).map_err(exr)?;
+        Header::write_all(&headers, file, false).map_err(exr)?;
+        let start = file.stream_position()? + 8 * side as u64;
+        let row_bytes = ROW_HEAD + 12 * side as u64;
+        for row in 0..side as u64 {
+            file.write_all(&(start + row * row_bytes).to_le_bytes())?;
+        }
+        fill(&RowWriter {
+            file: Mutex::new(file),
+            start,
+            width: side,
+        })
+    })
+}
+
+/// A file that is read by rows.
+pub(super) struct RowReader {
+    file: File,
+    /// Where each row begins.
+    offsets: Vec<u64>,
+    /// The number of the first row in the file.
+    first: i32,
+    attributes: BTreeMap<String, String>,
+}
+
+impl RowReader {
+    /// Opens a square image. `None` when it is not of the plain kind that this module writes, or no
+    /// EXR at all: who reads any EXR says what is wrong with it.
+    pub fn open(path: &Path) -> Result<Option<Self>, FileError> {
+        let file = File::open(path).map_err(|error| FileError::reading(path, &error))?;
+        Ok(Self::of_plain(file))
+    }
+
+    /// `None` unless the file is plain and as long as it should be.
+    fn of_plain(file: File) -> Option<Self> {
+        let mut read = PeekRead::new(BufReader::new(&file));
+        magic_number::validate_exr(&mut read).ok()?;
+        let requirements = Requirements::read(&mut read).ok()?;
+        requirements.validate().ok()?;
+        let headers = Header::read_all(&mut read, &requirements, false).ok()?;
+        let [header] = headers.as_slice() else {
+            return None;
+        };
+        let channels = &header.channels.list;
+        let named = channels.len() == CHANNELS.len()
+            && channels.iter().zip(CHANNELS).all(|(channel, (name, _))| {
+                channel.name.eq(name)
+                    && channel.sample_type == SampleType::F32
+                    && channel.sampling == Vec2(1, 1)
+            });
+        let side = header.layer_size.width();
+        let plain = named
+            && header.compression == Compression::Uncompressed
+            && header.blocks == BlockDescription::ScanLines
+            && !header.deep
+            && header.layer_size.height() == side;
+        if !plain {
+            return None;
+        }
+        let first = header.own_attributes.layer_position.y();
+        let attributes = text_attributes(header);
+        let offsets = MetaData::read_offset_tables(&mut read, &headers)
+            .ok()?
+            .into_iter()
+            .next()?;
+        let length = file.metadata().ok()?.len();
+        let whole = |offset: &u64| {
+            let end = offset.checked_add(ROW_HEAD + 12 * side as u64);
+            end.is_some_and(|end| end <= length)
+        };
+        let is_whole = offsets.len() == side && offsets.iter().all(whole);
+        is_whole.then_some(Self {
+            file,
+            offsets,
+            first,
+            attributes,
+        })
+    }
+
+    /// Rows, and columns.
+    pub fn side(&self) -> usize {
+        self.offsets.len()
+    }
+
+    /// The text attributes of the file, by name.
+    pub fn attributes(&self) -> &BTreeMap<String, String> {
+        &self.attributes
+    }
+
+    /// The value of a pixel.
+    pub fn value(&self, row: usize, column: usize) -> io::Result<[f32; 3]> {
+        let mut value = [0.0; 3];
+        for (place, (_, channel)) in CHANNELS.iter().enumerate() {
+            let before = (place * self.side() + column) as u64;
+            let mut bytes = [0; 4];
+            let at = self.offsets[row] + ROW_HEAD + 4 * before;
+            self.file.read_exact_at(&mut bytes, at)?;
+            value[*channel] = f32::from_le_bytes(bytes);
+        }
+        Ok(value)
+    }
+
+    /// All of it, R, G and B, by all threads; `None` when a row is not where the file says.
+    pub fn read_all(&self) -> io::Result<Option<[Vec<f32>; 3]>> {
+        let side = self.side();
+        let mut planes = [(); 3].map(|()| vec![0.0; side * side]);
+        let [red, green, blue] = &mut planes;
+        let rows = red
+            .par_chunks_mut(side)
+            .zip(green.par_chunks_mut(side))
+            .zip(blue.par_chunks_mut(side));
+        let in_place = rows.enumerate().map_init(
+            || vec![0; ROW_HEAD as usize + 12 * side],
+            |bytes, (row, ((red, green), blue))| {
+                self.file.read_exact_at(bytes, self.offsets[row])?;
+                let (head, values) = bytes.split_at(ROW_HEAD as usize);
+                let number = i64::from(self.first) + row as i64;
+                let expected = [number as i32, 12 * side as i32].map(i32::to_le_bytes);
+                let out = [red, green, blue];
+                for (bytes, (_, channel)) in values.chunks_exact(4 * side).zip(CHANNELS) {
+                    let values = bytes.as_chunks().0.iter();
+                    for (value, bytes) in out[channel].iter_mut().zip(values) {
+                        *value = f32::from_le_bytes(*bytes);
+                    }
+                }
+                Ok::<_, io::Error>(head == expected.as_flattened())
+            },
+        );
+        let in_place = in_place.try_reduce(|| true, |a, b| Ok(a && b))?;
+        Ok(in_place.then_some(planes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exr_planes;
+
+    #[test]
+    fn rows_written_in_any_order_are_an_ordinary_exr_and_read_back_one_by_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.exr");
+        let side = 24;
+        let plane = |c: usize, row: usize| -> Vec<f32> {
+            (0..side)
+                .map(|k| (1000 * c + side * row + k) as f32)
+                .collect()
+        };
+        let attributes = BTreeMap::from([("gonia.scale".to_owned(), "relative".to_owned())]);
+        write_rows(&path, side, &attributes, |writer| {
+            for row in (0..side).rev() {
+                let planes = [0, 1, 2].map(|c| plane(c, row));
+                writer.write(row, planes.each_ref().map(Vec::as_slice))?;
+            }
+            Ok(())
+        })
+        .unwrap();
+        let image = exr_planes::read(&path, |w, h| {
+            assert_eq!((w, h), (side, side));
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(image.attributes, attributes);
+        let reader = RowReader::open(&path).unwrap().unwrap();
+        assert_eq!(reader.side(), side);
+        assert_eq!(reader.attributes(), &attributes);
+        let whole = reader.read_all().unwrap().unwrap();
+        for (c, read) in image.planes.into_iter().enumerate() {
+            let read = read.into_f32();
+            assert_eq!(read, whole[c]);
+            for row in 0..side {
+                assert_eq!(read[row * side..(row + 1) * side], plane(c, row));
+                assert_eq!(reader.value(row, 7).unwrap()[c], plane(c, row)[7]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_failed_row_leaves_no_file_and_a_cut_file_is_not_opened() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.exr");
+        let full = || io::Error::from(io::ErrorKind::StorageFull);
+        write_rows(&path, 12, &BTreeMap::new(), |_| Err(full())).unwrap_err();
+        assert!(!path.exists());
+        let row = [0.5; 12];
+        write_rows(&path, 12, &BTreeMap::new(), |writer| {
+            (0..12).try_for_each(|k| writer.write(k, [&row; 3]))
+        })
+        .unwrap();
+        let length = std::fs::metadata(&path).unwrap().len();
+        let file = File::options().write(true).open(&path).unwrap();
+        file.set_len(length - 1).unwrap();
+        assert!(RowReader::open(&path).unwrap().is_none());
+    }
+
+    #[test]
+    fn rows_that_are_not_where_the_file_says_are_not_taken_for_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.exr");
+        let row = [0.5; 12];
+        write_rows(&path, 12, &BTreeMap::new(), |writer| {
+            (0..12).try_for_each(|k| writer.write(k, [&row; 3]))
+        })
+        .unwrap();
+        let reader = RowReader::open(&path).unwrap().unwrap();
+        assert!(reader.read_all().unwrap().is_some());
+        let file = File::options().write(true).open(&path).unwrap();
+        file.write_all_at(&7i32.to_le_bytes(), reader.offsets[3])
+            .unwrap();
+        assert!(reader.read_all().unwrap().is_none());
+    }
+}

@@ -1,0 +1,145 @@
+//! `masks.csv`: what hid the target at each pose of the reference, for other materials.
+
+use crate::csv_table::CsvTable;
+use crate::frames_csv::Degrees;
+use crate::{FileError, write_whole};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use gonia_brdf::Pose;
+use gonia_rig::Rig;
+use std::io::Write;
+use std::path::Path;
+
+/// The mask of one pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskRow {
+    /// The arms' reading.
+    pub pose: Pose,
+    /// The mask's bytes; `None` when nothing hid the target.
+    pub mask: Option<Vec<u8>>,
+}
+
+/// Reads masks, which must be of frames as the rig's camera takes them.
+///
+/// # Errors
+/// One line naming the file and its line: a missing column, a number that is none, frames of another
+/// size or focal length, or a mask that is not base64.
+pub fn read_masks_csv(path: &Path, rig: &Rig) -> Result<Vec<MaskRow>, FileError> {
+    let mut table = CsvTable::open(path)?;
+    let [theta_i, phi_i, theta_v, phi_v, width, height, focal, mask] = [
+        table.column("theta_i_deg")?,
+        table.column("phi_i_deg")?,
+        table.column("theta_v_deg")?,
+        table.column("phi_v_deg")?,
+        table.column("width_px")?,
+        table.column("height_px")?,
+        table.column("focal_px")?,
+        table.column("mask")?,
+    ];
+    let camera = &rig.camera;
+    let mut rows = Vec::new();
+    while table.next_row()? {
+        let size: [usize; 2] = [table.number(width)?, table.number(height)?];
+        let focal_px: f64 = table.number(focal)?;
+        if size != [camera.width_px, camera.height_px] || focal_px != camera.focal_px {
+            return Err(table.wrong(
+                format_args!(
+                    "the mask is of a frame of {} x {} pixels and a focal length of {focal_px}, but rig.toml has {} x {} and {}",
+                    size[0], size[1], camera.width_px, camera.height_px, camera.focal_px
+                ),
+                "use masks of the same camera",
+            ));
+        }
+        let text = table.text(mask)?;
+        let bytes = match text {
+            "" => None,
+            _ => Some(STANDARD.decode(text).map_err(|error| {
+                table.wrong(
+                    format_args!("the mask is not base64 ({error})"),
+                    "make the file again",
+                )
+            })?),
+        };
+        rows.push(MaskRow {
+            pose: Pose {
+                light: table.arm_direction(theta_i, phi_i)?,
+                view: table.arm_direction(theta_v, phi_v)?,
+            },
+            mask: bytes,
+        });
+    }
+    Ok(rows)
+}
+
+/// Writes masks whole.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_masks_csv(path: &Path, rig: &Rig, rows: &[MaskRow]) -> Result<(), FileError> {
+    let camera = &rig.camera;
+    write_whole(path, |out| {
+        writeln!(
+            out,
+            "theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg,width_px,height_px,focal_px,mask"
+        )?;
+        for row in rows {
+            let Pose { light, view } = row.pose;
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{},{}",
+                Degrees(light.theta_deg()),
+                Degrees(light.phi_deg()),
+                Degrees(view.theta_deg()),
+                Degrees(view.phi_deg()),
+                camera.width_px,
+                camera.height_px,
+                camera.focal_px,
+                row.mask
+                    .as_ref()
+                    .map_or(String::new(), |m| STANDARD.encode(m)),
+            )?;
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_brdf::Direction;
+
+    #[test]
+    fn masks_come_back_and_those_of_another_camera_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("masks.csv");
+        let row = |theta: f64, mask| MaskRow {
+            pose: Pose {
+                light: Direction::from_deg(theta, 0.0),
+                view: Direction::from_deg(30.0, 0.0),
+            },
+            mask,
+        };
+        let rows = [row(15.0, Some(vec![1, 2, 255])), row(30.0, None)];
+        let rig = Rig::paper(64);
+        write_masks_csv(&path, &rig, &rows).unwrap();
+        let back = read_masks_csv(&path, &rig).unwrap();
+        assert_eq!(back.len(), 2);
+        for (a, b) in rows.iter().zip(&back) {
+            assert_eq!(a.mask, b.mask);
+            assert!((a.pose.light.theta - b.pose.light.theta).abs() < 1e-9);
+        }
+        let error = read_masks_csv(&path, &Rig::paper(65))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("masks.csv, line 2: the mask is of a frame of 64 x 64"),
+            "{error}"
+        );
+        let text = std::fs::read_to_string(&path)
+            .unwrap()
+            .replace("AQL/", "A?L/");
+        std::fs::write(&path, text).unwrap();
+        let error = read_masks_csv(&path, &rig).unwrap_err().to_string();
+        assert!(error.contains("line 2: the mask is not base64"), "{error}");
+    }
+}

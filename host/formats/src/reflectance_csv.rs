@@ -1,0 +1,122 @@
+//! The table of a reference's reflectance: a CSV with r, g, b by theta_i, or by theta_i, phi_i,
+//! theta_v, phi_v (degrees).
+
+use crate::FileError;
+use crate::csv_table::CsvTable;
+use gonia_brdf::Pose;
+use gonia_rig::ReflectanceTable;
+use std::path::Path;
+
+/// Reflectance factors, π times the BRDF, lie below this even at grazing angles.
+const MOST: f64 = 10.0;
+
+/// Reads a table. Columns are found by name.
+///
+/// # Errors
+/// One line naming the file and its line: a missing column, no rows, an elevation outside
+/// 0° ≤ θ < 90°, one given twice, or a reflectance that is not above 0 and at most 10.
+pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
+    let mut table = CsvTable::open(path)?;
+    let theta_i = table.column("theta_i")?;
+    let others = ["phi_i", "theta_v", "phi_v"];
+    let by_pose = others
+        .iter()
+        .map(|name| table.optional_column(name))
+        .collect::<Result<Vec<_>, _>>()?
+        .iter()
+        .any(Option::is_some);
+    let [r, g, b] = [table.column("r")?, table.column("g")?, table.column("b")?];
+    let rho = |table: &CsvTable| {
+        let rho: [f64; 3] = [table.number(r)?, table.number(g)?, table.number(b)?];
+        match rho.iter().find(|rho| !(**rho > 0.0 && **rho <= MOST)) {
+            None => Ok(rho),
+            Some(wrong) => Err(table.wrong(
+                format_args!("{wrong} is no reflectance"),
+                format_args!("give more than 0 and at most {MOST}"),
+            )),
+        }
+    };
+    if by_pose {
+        let [phi_i, theta_v, phi_v] = [
+            table.column(others[0])?,
+            table.column(others[1])?,
+            table.column(others[2])?,
+        ];
+        let mut rows = Vec::new();
+        while table.next_row()? {
+            let pose = Pose {
+                light: table.arm_direction(theta_i, phi_i)?,
+                view: table.arm_direction(theta_v, phi_v)?,
+            };
+            rows.push((pose, rho(&table)?));
+        }
+        return some(path, rows.is_empty(), ReflectanceTable::ByPose(rows));
+    }
+    let mut rows: Vec<(f64, [f64; 3])> = Vec::new();
+    while table.next_row()? {
+        let theta: f64 = table.number(theta_i)?;
+        if !(0.0..90.0).contains(&theta) {
+            return Err(table.wrong(
+                format_args!("theta_i {theta} is not an elevation"),
+                "give degrees from the normal, from 0 to below 90",
+            ));
+        }
+        if rows.iter().any(|row| row.0 == theta) {
+            return Err(table.wrong(
+                format_args!("theta_i {theta} is there twice"),
+                "give each elevation once",
+            ));
+        }
+        rows.push((theta, rho(&table)?));
+    }
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    some(path, rows.is_empty(), ReflectanceTable::ByIncidence(rows))
+}
+
+fn some(path: &Path, empty: bool, table: ReflectanceTable) -> Result<ReflectanceTable, FileError> {
+    if empty {
+        return Err(FileError::new(path, "has no rows", "give at least one"));
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<ReflectanceTable, FileError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.csv");
+        std::fs::write(&path, text).unwrap();
+        read_reflectance(&path)
+    }
+
+    #[test]
+    fn tables_by_incidence_are_put_in_order_and_those_by_pose_keep_theirs() {
+        let table = read("theta_i,r,g,b\n60,.9,.9,.9\n8,.99,.98,.97\n").unwrap();
+        let expected = vec![(8.0, [0.99, 0.98, 0.97]), (60.0, [0.9; 3])];
+        assert_eq!(table, ReflectanceTable::ByIncidence(expected));
+        let table = read("theta_i,phi_i,theta_v,phi_v,r,g,b\n45,0,0,0,1.01,1,1\n").unwrap();
+        assert!(matches!(table, ReflectanceTable::ByPose(rows) if rows.len() == 1));
+    }
+
+    #[test]
+    fn what_is_no_reflectance_names_its_line() {
+        for (rows, said) in [
+            ("8,.9,0,.9", "line 2: 0 is no reflectance"),
+            ("8,.9,nan,.9", "NaN is no reflectance"),
+            ("90,.9,.9,.9", "theta_i 90 is not an elevation"),
+            ("8,1,1,1\n8,1,1,1", "line 3: theta_i 8 is there twice"),
+            ("", "has no rows"),
+        ] {
+            let error = read(&format!("theta_i,r,g,b\n{rows}\n"))
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(said), "{error}");
+        }
+        let error = read("theta_i,theta_v,r,g,b\n1,2,1,1,1\n")
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("no column \"phi_i\""), "{error}");
+    }
+}

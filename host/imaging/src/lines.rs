@@ -1,0 +1,218 @@
+//! The neighbourhoods of the four lines: pixels along runs across each predicted line.
+
+use crate::luminance;
+use gonia_rig::{CameraModel, Frame, Homography, Target};
+
+/// The lines x = −a, x = +a, y = −a, y = +a, in this order everywhere.
+pub const SIDES: [Side; 4] = [
+    Side {
+        axis: 0,
+        sign: -1.0,
+    },
+    Side { axis: 0, sign: 1.0 },
+    Side {
+        axis: 1,
+        sign: -1.0,
+    },
+    Side { axis: 1, sign: 1.0 },
+];
+
+/// More stations on a line than this cost time and bring little.
+const MAX_STATIONS: f64 = 256.0;
+/// Pixels kept beyond the search range and the line itself, for the fit's own window.
+const WINDOW_PX: f64 = 4.0;
+/// Distance from the ends of a line (the crossings) at which stations begin, pixels.
+const CLEAR_OF_CROSSING_PX: f64 = 4.0;
+
+/// Which of the four lines: the coordinate that is constant on it, and its sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Side {
+    pub axis: usize,
+    pub sign: f64,
+}
+
+impl Side {
+    /// The line's ends, where it crosses its neighbours, mm.
+    pub fn ends_mm(self, a: f64) -> [[f64; 2]; 2] {
+        let mut ends = [[self.sign * a; 2]; 2];
+        ends[0][1 - self.axis] = -a;
+        ends[1][1 - self.axis] = a;
+        ends
+    }
+}
+
+/// One line as predicted, with the pixels around it. Positions are in ideal pixels: `s` runs from
+/// −1 to 1 between the crossings, `t` outwards from the predicted line.
+pub struct LineStrip {
+    from: [f64; 2],
+    along: [f64; 2],
+    outward: [f64; 2],
+    length: f64,
+    /// Stations in order.
+    pub stations: Vec<Station>,
+    /// The pixels of all stations' runs.
+    pub samples: Vec<RunSample>,
+}
+
+/// A run of pixels across the line.
+pub struct Station {
+    /// Place along the line.
+    pub s: f64,
+    /// Pixels outwards a millimetre of the target.
+    pub px_per_mm: f64,
+    /// Its samples.
+    pub run: std::ops::Range<usize>,
+}
+
+/// One pixel of a run.
+#[derive(Clone, Copy)]
+pub struct RunSample {
+    pub s: f32,
+    pub t: f32,
+    /// Luminance; NaN where the frame has none.
+    pub value: f32,
+    /// Its place in the frame.
+    pub pixel: [u16; 2],
+}
+
+impl LineStrip {
+    /// Cuts the strip around one line out of a frame, `search_px` to either side. Empty when the
+    /// line is outside the frame or seen edge-on.
+    pub fn cut(
+        frame: &Frame,
+        camera: &CameraModel,
+        target_to_px: &Homography,
+        target: &Target,
+        side: Side,
+        search_px: f64,
+    ) -> Self {
+        let a = target.line_offset_mm;
+        let [from, to] = side.ends_mm(a).map(|end| target_to_px.apply(end));
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let along = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
+        let mut middle = [0.0; 2];
+        middle[side.axis] = side.sign * a;
+        let step = target_to_px.jacobian(middle)[side.axis].map(|d| d * side.sign);
+        let left = [-along[1], along[0]];
+        let outward = if left[0] * step[0] + left[1] * step[1] > 0.0 {
+            left
+        } else {
+            left.map(|c| -c)
+        };
+        let mut strip = Self {
+            from,
+            along,
+            outward,
+            length,
+            stations: Vec::new(),
+            samples: Vec::new(),
+        };
+        // Beside the corner of the sample there is nothing between material and desk to go by.
+        let reach = (1.0 - 2.0 * CLEAR_OF_CROSSING_PX / length).min(target.material_half_mm / a);
+        if let Some(target_from_px) = target_to_px.inverse()
+            && length.is_finite()
+            && reach > 0.0
+        {
+            let across = |p: [f64; 2]| {
+                let mm = target_from_px.apply(p);
+                let d = target_to_px.jacobian(mm)[side.axis];
+                (d[0] * outward[0] + d[1] * outward[1]).abs()
+            };
+            // Perspective makes the near end of a line up to half as wide again as its middle.
+            let half_line = 0.75 * target.line_width_mm * step[0].hypot(step[1]);
+            let reach_px = search_px + half_line + WINDOW_PX;
+            strip.fill(frame, camera, reach_px, reach, across);
+        }
+        strip
+    }
+
+    fn fill(
+        &mut self,
+        frame: &Frame,
+        camera: &CameraModel,
+        reach_px: f64,
+        reach: f64,
+        px_per_mm: impl Fn([f64; 2]) -> f64,
+    ) {
+        // Runs go down the columns under a flat line and along the rows beside a steep one.
+        let main = usize::from(self.along[0].abs() < self.along[1].abs());
+        let cross = 1 - main;
+        let half = (reach_px / self.outward[cross].abs()).ceil() as i64;
+        let extent = self.length * self.along[main].abs() * reach;
+        let count = extent.min(MAX_STATIONS).floor() as usize;
+        let size = [frame.width as i64, frame.height as i64];
+        for i in 0..count {
+            let s = reach * ((2 * i + 1) as f64 / count as f64 - 1.0);
+            let ideal = self.point(s, 0.0);
+            let centre = camera.distort(ideal).map(|c| c.floor() as i64);
+            if !(0..size[main]).contains(&centre[main]) {
+                continue;
+            }
+            let start = self.samples.len();
+            for k in (centre[cross] - half).max(0)..(centre[cross] + half + 1).min(size[cross]) {
+                let mut pixel = centre;
+                pixel[cross] = k;
+                let [column, row] = pixel.map(|c| c as usize);
+                let (s, t) = self.place(camera.undistort(pixel.map(|c| c as f64 + 0.5)));
+                self.samples.push(RunSample {
+                    s: s as f32,
+                    t: t as f32,
+                    value: luminance(frame.rgb[row * frame.width + column]),
+                    pixel: [column as u16, row as u16],
+                });
+            }
+            if self.samples.len() > start {
+                self.stations.push(Station {
+                    s: self.place(ideal).0,
+                    px_per_mm: px_per_mm(ideal),
+                    run: start..self.samples.len(),
+                });
+            }
+        }
+    }
+
+    /// The ideal pixel at a place of the strip.
+    pub fn point(&self, s: f64, t: f64) -> [f64; 2] {
+        let d = 0.5 * (s + 1.0) * self.length;
+        [0, 1].map(|i| self.from[i] + d * self.along[i] + t * self.outward[i])
+    }
+
+    /// The place (s, t) of an ideal pixel.
+    pub fn place(&self, ideal: [f64; 2]) -> (f64, f64) {
+        let d = [ideal[0] - self.from[0], ideal[1] - self.from[1]];
+        let dot = |axis: [f64; 2]| d[0] * axis[0] + d[1] * axis[1];
+        (2.0 * dot(self.along) / self.length - 1.0, dot(self.outward))
+    }
+
+    /// Sobel gradient outwards of a sample's pixel; 0 at the border.
+    pub fn gradient(&self, frame: &Frame, sample: &RunSample) -> f32 {
+        let [column, row] = sample.pixel.map(usize::from);
+        let g = sobel(frame, column, row);
+        g[0] * self.outward[0] as f32 + g[1] * self.outward[1] as f32
+    }
+
+    /// Mean number of pixels outwards a millimetre.
+    pub fn px_per_mm(&self) -> f64 {
+        let sum: f64 = self.stations.iter().map(|s| s.px_per_mm).sum();
+        sum / self.stations.len().max(1) as f64
+    }
+}
+
+/// The Sobel gradient of luminance per pixel (right, down); zero at the border and beside pixels
+/// that are not numbers.
+fn sobel(frame: &Frame, column: usize, row: usize) -> [f32; 2] {
+    if column == 0 || row == 0 || column + 1 >= frame.width || row + 1 >= frame.height {
+        return [0.0; 2];
+    }
+    let at =
+        |dc: usize, dr: usize| luminance(frame.rgb[(row + dr - 1) * frame.width + column + dc - 1]);
+    let (nw, ne, sw, se) = (at(0, 0), at(2, 0), at(0, 2), at(2, 2));
+    let right = (ne + 2.0 * at(2, 1) + se) - (nw + 2.0 * at(0, 1) + sw);
+    let down = (sw + 2.0 * at(1, 2) + se) - (nw + 2.0 * at(1, 0) + ne);
+    let g = [right * 0.125, down * 0.125];
+    if g[0].is_finite() && g[1].is_finite() {
+        g
+    } else {
+        [0.0; 2]
+    }
+}

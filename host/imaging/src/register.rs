@@ -1,0 +1,575 @@
+//! Registration: where the target is in a frame, and where the camera must have been.
+//!
+//! Sobel and Hough find each line near its prediction, a least-squares fit of the blurred profile
+//! places it to hundredths of a pixel, and crossings make the homography. The rig's camera, moved a
+//! little, is the prior: what a grazing or half-hidden line leaves open is filled in from it, and
+//! the move is the estimate of the arms' error.
+
+use crate::hough::{StripLine, strongest_line};
+use crate::lines::{LineStrip, SIDES};
+use crate::refine::{Fit, FoundLine, Starts, fit_lines};
+use gonia_brdf::{Direction, Pose};
+use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
+use nalgebra::{DMatrix, DVector};
+
+/// Prior standard deviations of θ and φ (the arms' 0.03°), roll, image shift (in frame widths) and
+/// ln magnification.
+const ARM_DEG: f64 = 0.03;
+const ROLL_DEG: f64 = 0.1;
+const SHIFT_WIDTHS: f64 = 5e-4;
+const LN_SCALE: f64 = 2e-3;
+/// What the pinhole model itself is trusted to, pixels at 1000 pixels' width, and never better than
+/// this many pixels.
+const MODEL_PX_PER_1000: f64 = 0.05;
+const MODEL_PX: f64 = 0.02;
+/// Floor of a line's own standard error, pixels.
+const LINE_FLOOR_PX: f64 = 0.003;
+/// With less than a pixel of desk between line and material each can stand in for the other: this
+/// many pixels, times 1/gap⁴ − 1, come on top.
+const CROWDED_PX: f64 = 0.04;
+/// Lines that the moved camera misses by more than this share of the width are not the target's.
+const MISFIT_WIDTHS: f64 = 6e-4;
+/// Nothing is believed of a frame in which fewer lines are seen.
+const MIN_LINES: usize = 3;
+/// Sum of squared standard deviations (of fourteen numbers with six unknowns; 8 is usual) above
+/// which something is wrong.
+const MAX_SURPRISE: f64 = 25.0;
+/// Nor are lines that want roll, shift or magnification this many standard deviations off.
+const MAX_DEVIATION: f64 = 6.0;
+/// Standard deviation of an arm that does not hold its 0.03°.
+const LOOSE_ARM_DEG: f64 = 0.5;
+/// Nor are lines that want the arm this far from its reading.
+const MAX_OFFSET_DEG: f64 = 1.0;
+/// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
+const HOUGH_RESOLUTION: f64 = 0.5;
+/// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
+const SEARCH_WIDTHS: f64 = 0.02;
+/// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
+const NEAR_WIDTHS: f64 = 1e-3;
+/// A line further than this from its prediction is measured again from a better one.
+const RELINEARIZE_PX: f64 = 1.5;
+
+/// Finds the target of one rig in frames.
+#[derive(Clone, Debug)]
+pub struct Registrar {
+    camera: CameraModel,
+    target: Target,
+    hough_resolution: f64,
+}
+
+/// Where the target is in one frame.
+#[derive(Clone, Debug)]
+pub struct Registration {
+    /// Millimetres on the target to ideal pixels; [`Registration::project`] adds the lens.
+    pub pixel_from_target: Homography,
+    /// RMS distance of the lines' points from the lines, pixels; 0 when none was found.
+    pub residual_px: f64,
+    /// Estimated true camera direction minus the arm's reading; zero after a fall-back.
+    pub pose_offset: PoseOffset,
+    /// The camera's direction as estimated.
+    pub view: Direction,
+    /// Standard deviation of the image's blur, pixels, as the lines show it.
+    pub blur_px: f64,
+    /// How many of the four lines were found; when locked, how many were used.
+    pub lines_found: usize,
+    /// Whether the marks carry this registration.
+    pub state: State,
+    camera: CameraModel,
+}
+
+/// Estimated true shaft angles minus the reading.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PoseOffset {
+    /// Of the camera's elevation, degrees.
+    pub theta_deg: f64,
+    /// Of the camera's azimuth, degrees.
+    pub phi_deg: f64,
+}
+
+/// Whether a registration stands on the marks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum State {
+    /// It does.
+    Locked,
+    /// It is the prediction from the arms' reading.
+    FellBack(Reason),
+}
+
+/// Why the marks could not be trusted.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Reason {
+    /// Too few lines stand out from their surroundings.
+    #[error("only {found} of the 4 lines could be found near where the pose puts them")]
+    LinesMissing {
+        /// Lines that were found.
+        found: usize,
+    },
+    /// The lines found are not those of the target under this camera.
+    #[error(
+        "the lines found are not laid out as this camera sees the target's (they miss by {misfit_px:.2} pixels, at {deviation:.0} times the camera's usual deviations)"
+    )]
+    WrongLayout {
+        /// RMS distance from the best camera, pixels.
+        misfit_px: f64,
+        /// How far that camera's roll, shift or magnification is off, in standard deviations.
+        deviation: f64,
+    },
+    /// The lines ask for a camera too far from its arm's reading.
+    #[error("the lines put the camera {offset_deg:.1} degrees from its arm's reading")]
+    FarFromPose {
+        /// Angle between reading and estimate.
+        offset_deg: f64,
+    },
+}
+
+impl Registration {
+    /// The pixel that shows a point of the target (mm).
+    pub fn project(&self, point_mm: [f64; 2]) -> [f64; 2] {
+        self.camera.distort(self.pixel_from_target.apply(point_mm))
+    }
+
+    /// The camera of the rig.
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+}
+
+impl Registrar {
+    /// For the frames of a rig.
+    pub fn new(rig: &Rig) -> Self {
+        Self {
+            camera: CameraModel::new(&rig.camera),
+            target: rig.target.clone(),
+            hough_resolution: HOUGH_RESOLUTION,
+        }
+    }
+
+    /// With another size of Hough's bins, in half widths of a line; 0.5 is the default.
+    #[must_use]
+    pub fn with_hough_resolution(mut self, half_widths: f64) -> Self {
+        self.hough_resolution = half_widths;
+        self
+    }
+
+    /// Registers a frame taken at the given reading of the arms. Never fails: without marks it
+    /// falls back to the prediction, and says so.
+    pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
+        let predicted = self.camera.predict(reading.view, CameraShift::default());
+        let mut solved = self.solve(frame, reading.view, &predicted);
+        if let Ok(solution) = &solved
+            && solution.furthest_px > RELINEARIZE_PX
+        {
+            solved = self.solve(frame, reading.view, &solution.homography);
+        }
+        match solved {
+            Ok(solution) => Registration {
+                view: Direction::from_deg(
+                    (reading.view.theta + solution.shift.theta).to_degrees(),
+                    (reading.view.phi + solution.shift.phi).to_degrees(),
+                ),
+                pose_offset: PoseOffset {
+                    theta_deg: solution.shift.theta.to_degrees(),
+                    phi_deg: solution.shift.phi.to_degrees(),
+                },
+                pixel_from_target: solution.homography,
+                residual_px: solution.scatter_px,
+                blur_px: solution.blur_px,
+                lines_found: solution.lines_found,
+                state: State::Locked,
+                camera: self.camera.clone(),
+            },
+            Err(failure) => Registration {
+                pixel_from_target: predicted,
+                residual_px: failure.scatter_px,
+                pose_offset: PoseOffset::default(),
+                view: reading.view,
+                blur_px: failure.blur_px,
+                lines_found: failure.lines_found,
+                state: State::FellBack(failure.reason),
+                camera: self.camera.clone(),
+            },
+        }
+    }
+
+    fn solve(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+    ) -> Result<Solution, Failure> {
+        let width = frame.width as f64;
+        let strips = self.strips(frame, predicted, NEAR_WIDTHS * width + 4.0);
+        let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+        if fit.lines.iter().all(Option::is_some) {
+            let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
+            // All four lines where a trusted camera sees them: no need to look elsewhere.
+            if estimate.surprise <= MAX_SURPRISE {
+                return self.settle(view, &strips, fit, estimate);
+            }
+        }
+        let search_px = SEARCH_WIDTHS * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
+        let half_width = 0.5 * self.target.line_width_mm;
+        let hough = strips.each_ref().map(|strip| {
+            strongest_line(frame, strip, half_width, search_px, self.hough_resolution)
+        });
+        self.search(view, &strips, hough).or_else(|failure| {
+            // A striped fabric may have lines of its own, stronger than the marks beside them.
+            let again = self.search(view, &strips, [None; 4]);
+            again.map_err(|second| match second.reason {
+                // Hidden lines, and others where the pose has them: that says more.
+                Reason::LinesMissing { found } if found > 0 => second,
+                _ => failure,
+            })
+        })
+    }
+
+    /// The neighbourhoods of the four lines, `search_px` to either side.
+    fn strips(&self, frame: &Frame, predicted: &Homography, search_px: f64) -> [LineStrip; 4] {
+        SIDES.map(|side| {
+            LineStrip::cut(
+                frame,
+                &self.camera,
+                predicted,
+                &self.target,
+                side,
+                search_px,
+            )
+        })
+    }
+
+    /// Looks for the lines about the prediction and where Hough found some.
+    fn search(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        hough: [Option<StripLine>; 4],
+    ) -> Result<Solution, Failure> {
+        let fit = fit_lines(strips, &Starts::Around(hough), &self.target);
+        let found = fit.lines.iter().flatten().count();
+        if found < MIN_LINES {
+            // Even those few must be where the pose has them, or they are something else.
+            let estimate = self.estimate(view, strips, &fit.lines, &self.trust(ARM_DEG));
+            if found > 0 && estimate.surprise > MAX_SURPRISE {
+                return Err(Failure::new(estimate.wrong_layout(), &fit));
+            }
+            return Err(Failure::new(Reason::LinesMissing { found }, &fit));
+        }
+        let estimate = self.best_estimate(view, strips, &fit.lines);
+        self.settle(view, strips, fit, estimate)
+    }
+
+    /// Judges four fitted lines, and makes the homography of them.
+    fn settle(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        fit: Fit,
+        estimate: Estimate,
+    ) -> Result<Solution, Failure> {
+        let width = self.camera.size_px[0] as f64;
+        let fits = estimate.misfit_px <= (MISFIT_WIDTHS * width).max(0.2)
+            && estimate.camera_deviation <= MAX_DEVIATION
+            // Three lines may not overrule the rig.
+            && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
+        if !fits {
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
+        }
+        let shift = estimate.shift;
+        let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
+        if offset_deg > MAX_OFFSET_DEG {
+            return Err(Failure::new(Reason::FarFromPose { offset_deg }, &fit));
+        }
+        let Some(homography) = self.homography(strips, &estimate.lines) else {
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
+        };
+        let furthest_px = estimate.lines.iter().map(|l| l.abs()).fold(0.0, f64::max);
+        Ok(Solution {
+            homography,
+            shift,
+            scatter_px: scatter(&fit),
+            blur_px: fit.sigma_px,
+            lines_found: estimate.lines_used,
+            furthest_px,
+        })
+    }
+
+    /// The estimate that believes most: all lines and the arm's reading; all lines and an arm that
+    /// is off; all lines but one, where that one contradicts the rest because something else was
+    /// taken for it; at last all lines, and a layout that is not quite what the rig says.
+    fn best_estimate(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        lines: &[Option<FoundLine>; 4],
+    ) -> Estimate {
+        let trusting = self.estimate(view, strips, lines, &self.trust(ARM_DEG));
+        if trusting.surprise <= MAX_SURPRISE {
+            return trusting;
+        }
+        let arm_off = self.estimate(view, strips, lines, &self.trust(LOOSE_ARM_DEG));
+        if arm_off.surprise <= MAX_SURPRISE {
+            return arm_off;
+        }
+        if arm_off.lines_used == MIN_LINES {
+            return arm_off;
+        }
+        let without = (0..4).map(|i| {
+            let mut rest = *lines;
+            rest[i] = None;
+            self.estimate(view, strips, &rest, &self.trust(ARM_DEG))
+        });
+        let best = without.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
+        if let Some(best) = best.filter(|e| e.surprise <= MAX_SURPRISE) {
+            return best;
+        }
+        let mut trust = self.trust(LOOSE_ARM_DEG);
+        trust.model_px = trust.model_px.max(arm_off.misfit_px);
+        self.estimate(view, strips, lines, &trust)
+    }
+
+    fn trust(&self, arm_deg: f64) -> Trust {
+        let width = self.camera.size_px[0] as f64;
+        Trust {
+            arm_deg,
+            model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
+        }
+    }
+
+    /// The camera, moved from its reading, that fits the lines best, and the lines as they follow
+    /// from it and from their own measurement: offsets and slopes of the four lines are
+    /// δ = δ(p) + e, with Gaussian priors on the camera's moves p and on the model's error e.
+    fn estimate(
+        &self,
+        view: Direction,
+        strips: &[LineStrip; 4],
+        lines: &[Option<FoundLine>; 4],
+        trust: &Trust,
+    ) -> Estimate {
+        let tau = trust.model_px;
+        let found: Vec<usize> = (0..8).filter(|k| lines[k / 2].is_some()).collect();
+        let n = found.len();
+        let mut measured = DVector::zeros(n);
+        let mut covariance = DMatrix::from_diagonal_element(n, n, tau * tau);
+        for (row, pair) in found.chunks_exact(2).enumerate() {
+            let Some(line) = &lines[pair[0] / 2] else {
+                continue;
+            };
+            measured[2 * row] = line.line.offset;
+            measured[2 * row + 1] = line.line.slope;
+            let own = inverse_2x2(line.information);
+            for r in 0..2 {
+                for c in 0..2 {
+                    covariance[(2 * row + r, 2 * row + c)] += own[r][c];
+                }
+                covariance[(2 * row + r, 2 * row + r)] += self.line_variance(&strips[pair[0] / 2]);
+            }
+        }
+        let failed = Estimate {
+            shift: CameraShift::default(),
+            lines: [0.0; 8],
+            lines_used: n / 2,
+            surprise: f64::INFINITY,
+            misfit_px: f64::NAN,
+            camera_deviation: f64::NAN,
+        };
+        let Some(weight) = covariance.cholesky().map(|c| c.inverse()) else {
+            return failed;
+        };
+        let scale = self.prior_scale(trust.arm_deg);
+        let model = |p: &DVector<f64>| self.line_places(view, shift_from(p, &scale), strips);
+        let mut p = DVector::zeros(6);
+        let mut places = model(&p);
+        for _ in 0..3 {
+            let mut jacobian = DMatrix::zeros(n, 6);
+            for k in 0..6 {
+                let step = 1e-2;
+                let mut q = p.clone();
+                q[k] += step;
+                let moved = model(&q);
+                for (row, i) in found.iter().enumerate() {
+                    jacobian[(row, k)] = (moved[*i] - places[*i]) / step;
+                }
+            }
+            let residual = DVector::from_fn(n, |row, _| measured[row] - places[found[row]]);
+            let normal = jacobian.transpose() * &weight * &jacobian + DMatrix::identity(6, 6);
+            let right = jacobian.transpose() * &weight * residual - &p;
+            let Some(factor) = normal.cholesky() else {
+                return failed;
+            };
+            p += factor.solve(&right);
+            places = model(&p);
+        }
+        let residual = DVector::from_fn(n, |row, _| measured[row] - places[found[row]]);
+        let correction = &weight * &residual * (tau * tau);
+        let mut lines = places;
+        for (row, i) in found.iter().enumerate() {
+            lines[*i] += correction[row];
+        }
+        Estimate {
+            shift: shift_from(&p, &scale),
+            lines,
+            lines_used: n / 2,
+            surprise: (residual.transpose() * &weight * &residual)[0] + p.norm_squared(),
+            misfit_px: residual.norm() / (n as f64).sqrt(),
+            camera_deviation: p.rows(2, 4).amax(),
+        }
+    }
+
+    /// What a line's place is trusted to at best, px².
+    fn line_variance(&self, strip: &LineStrip) -> f64 {
+        let gap_mm = self.target.line_offset_mm
+            - self.target.material_half_mm
+            - 0.5 * self.target.line_width_mm;
+        let gap_px = (gap_mm * strip.px_per_mm()).max(1e-3);
+        let crowded = CROWDED_PX * (gap_px.powi(-4) - 1.0).max(0.0);
+        LINE_FLOOR_PX.powi(2) + crowded * crowded
+    }
+
+    fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {
+        let shift = SHIFT_WIDTHS * self.camera.size_px[0] as f64;
+        [
+            arm_deg.to_radians(),
+            arm_deg.to_radians(),
+            ROLL_DEG.to_radians(),
+            shift,
+            shift,
+            LN_SCALE,
+        ]
+    }
+
+    /// Offsets and slopes of the four lines, in their strips, for a moved camera.
+    fn line_places(
+        &self,
+        view: Direction,
+        shift: CameraShift,
+        strips: &[LineStrip; 4],
+    ) -> [f64; 8] {
+        let map = self.camera.predict(view, shift);
+        let mut places = [0.0; 8];
+        for (i, side) in SIDES.iter().enumerate() {
+            let [(s0, t0), (s1, t1)] = side
+                .ends_mm(self.target.line_offset_mm)
+                .map(|end| strips[i].place(map.apply(end)));
+            let slope = (t1 - t0) / (s1 - s0);
+            places[2 * i] = t0 - slope * s0;
+            places[2 * i + 1] = slope;
+        }
+        places
+    }
+
+    /// The homography through the crossings of four lines given by offset and slope.
+    fn homography(&self, strips: &[LineStrip; 4], lines: &[f64; 8]) -> Option<Homography> {
+        let line = |i: usize| {
+            let end = |s: f64| strips[i].point(s, lines[2 * i] + lines[2 * i + 1] * s);
+            [end(-1.0), end(1.0)]
+        };
+        let a = self.target.line_offset_mm;
+        let corners = [[-a, -a], [a, -a], [a, a], [-a, a]];
+        let mut seen = [[0.0; 2]; 4];
+        for (seen, [x, y]) in seen.iter_mut().zip(corners) {
+            let across = line(usize::from(x > 0.0));
+            let along = line(2 + usize::from(y > 0.0));
+            *seen = crossing(across, along)?;
+        }
+        Homography::from_corners(&corners, &seen)
+    }
+}
+
+struct Solution {
+    homography: Homography,
+    shift: CameraShift,
+    scatter_px: f64,
+    blur_px: f64,
+    lines_found: usize,
+    furthest_px: f64,
+}
+
+/// Why there is no solution, and what was seen nevertheless.
+struct Failure {
+    reason: Reason,
+    scatter_px: f64,
+    blur_px: f64,
+    lines_found: usize,
+}
+
+impl Failure {
+    fn new(reason: Reason, fit: &Fit) -> Self {
+        Self {
+            reason,
+            scatter_px: scatter(fit),
+            blur_px: fit.sigma_px,
+            lines_found: fit.lines.iter().flatten().count(),
+        }
+    }
+}
+
+struct Estimate {
+    shift: CameraShift,
+    /// Offset and slope of each line.
+    lines: [f64; 8],
+    lines_used: usize,
+    /// Sum of squared deviations from the priors and the measured lines, in standard deviations.
+    surprise: f64,
+    /// RMS distance of the measured lines from the moved camera's.
+    misfit_px: f64,
+    /// The largest of roll, shift and magnification, in standard deviations of its prior.
+    camera_deviation: f64,
+}
+
+/// How far reading and model are believed.
+struct Trust {
+    /// Standard deviation of the arm's reading, degrees.
+    arm_deg: f64,
+    /// Standard deviation of the model's lines, pixels.
+    model_px: f64,
+}
+
+impl Estimate {
+    fn wrong_layout(&self) -> Reason {
+        Reason::WrongLayout {
+            misfit_px: self.misfit_px,
+            deviation: self.camera_deviation,
+        }
+    }
+}
+
+fn shift_from(p: &DVector<f64>, scale: &[f64; 6]) -> CameraShift {
+    CameraShift {
+        theta: p[0] * scale[0],
+        phi: p[1] * scale[1],
+        roll: p[2] * scale[2],
+        shift_px: [p[3] * scale[3], p[4] * scale[4]],
+        log_scale: p[5] * scale[5],
+    }
+}
+
+fn scatter(fit: &Fit) -> f64 {
+    let found: Vec<f64> = fit.lines.iter().flatten().map(|l| l.scatter_px).collect();
+    let sum: f64 = found.iter().map(|s| s * s).sum();
+    (sum / found.len().max(1) as f64).sqrt()
+}
+
+fn inverse_2x2(m: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    let det = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).max(f64::MIN_POSITIVE);
+    [
+        [m[1][1] / det, -m[0][1] / det],
+        [-m[1][0] / det, m[0][0] / det],
+    ]
+}
+
+/// Where two lines, each through two points, cross. `None` for parallel ones.
+fn crossing(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> Option<[f64; 2]> {
+    let d = [a[1][0] - a[0][0], a[1][1] - a[0][1]];
+    let e = [b[1][0] - b[0][0], b[1][1] - b[0][1]];
+    let det = d[0] * e[1] - d[1] * e[0];
+    if det.abs() < 1e-9 {
+        return None;
+    }
+    let g = [b[0][0] - a[0][0], b[0][1] - a[0][1]];
+    let t = (g[0] * e[1] - g[1] * e[0]) / det;
+    Some([a[0][0] + t * d[0], a[0][1] + t * d[1]])
+}
+
+#[cfg(test)]
+mod photographs;

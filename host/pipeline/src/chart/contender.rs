@@ -1,0 +1,296 @@
+//! The methods that are compared.
+
+use crate::chart::cpu::cpu_seconds;
+use gonia_brdf::cellwise::{
+    CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
+};
+use gonia_brdf::interpolate::{self, FillError, Known, Preset, Settings};
+use gonia_brdf::{Bins, Grid};
+use rayon::prelude::*;
+use std::fmt;
+use std::str::FromStr;
+
+/// A method with its settings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Contender {
+    /// One cell at a time.
+    Cellwise(CellSettings),
+    /// Block by block, with these settings to begin with; the material's own are chosen.
+    Blocks(Settings),
+}
+
+/// What kind of method it is: the colours of the chart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Blocks: gonia's own.
+    Blocks,
+    /// The paper's, and its variations.
+    Linear,
+    /// Other radial basis functions.
+    Rbf,
+    /// Moving least squares.
+    LeastSquares,
+    /// Nearest, inverse distance.
+    Distance,
+}
+
+impl Family {
+    /// All of them, in the order of a legend.
+    pub const ALL: [Family; 5] = [
+        Family::Blocks,
+        Family::Linear,
+        Family::Rbf,
+        Family::LeastSquares,
+        Family::Distance,
+    ];
+
+    /// Its name in legends and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Family::Blocks => "blocks",
+            Family::Linear => "linear RBF",
+            Family::Rbf => "other RBF",
+            Family::LeastSquares => "least squares",
+            Family::Distance => "by distance",
+        }
+    }
+}
+
+/// Values of the cells asked for, and what they cost.
+pub(super) struct Run {
+    pub values: Vec<[f32; 3]>,
+    /// CPU seconds of the full fill.
+    pub core_s: f64,
+    /// Share of the interpolations that were done.
+    pub share: f64,
+    /// Share of those that failed.
+    pub failed: f64,
+}
+
+/// Block settings beside the presets, by name: no refinement, all of it, more and less.
+const BLOCKS: [&str; 6] = [
+    "blocks=16,nodes=64,tolerance=inf",
+    "blocks=8,nodes=64,tolerance=inf",
+    "blocks=8,nodes=128,tolerance=inf",
+    "blocks=8,nodes=64,tolerance=1",
+    "blocks=8,nodes=128,tolerance=4",
+    "blocks=8,nodes=128,tolerance=0",
+];
+
+/// Methods that work cell by cell, by name.
+const CELLWISE: [&str; 26] = [
+    "paper",
+    "rbf-linear,k=25",
+    "rbf-linear,k=50",
+    "rbf-linear,k=100",
+    "rbf-linear,k=400",
+    "rbf-linear,nugget=0",
+    "rbf-linear,angles",
+    "rbf-linear,means",
+    "rbf-linear,means,mirrored",
+    "rbf-linear,log,means,mirrored",
+    "rbf-linear,half=0.5,log,means,mirrored",
+    "rbf-linear,sum=0.5,log,means,mirrored",
+    "rbf-thin-plate",
+    "rbf-cubic",
+    "rbf-gaussian",
+    "rbf-multiquadric",
+    "rbf-wendland",
+    "rbf-matern,k=50,half=0.5,log,means,mirrored",
+    "rbf-matern,half=0.5,log,means,mirrored",
+    "nearest",
+    "nearest,half=0.5,means,mirrored",
+    "shepard",
+    "shepard,half=0.5,log,means,mirrored",
+    "mls1",
+    "mls1,half=0.5,log,means,mirrored",
+    "mls2,half=0.5,log,means,mirrored",
+];
+
+/// What is compared when nothing else is said: the default first, and no block smaller than a step
+/// of the grid.
+pub fn standard(grid: Grid) -> Vec<Contender> {
+    let default = Contender::default_of(grid);
+    let presets = Preset::ALL.map(|preset| Contender::blocks(preset.settings(), grid));
+    let named = BLOCKS.iter().chain(&CELLWISE);
+    let named = named.filter_map(|name| name.parse::<Contender>().ok());
+    let others = presets.into_iter().chain(named);
+    let fits = |contender: &Contender| match contender {
+        Contender::Blocks(settings) => settings.block_deg >= 2.0 * grid.step_deg(),
+        Contender::Cellwise(_) => true,
+    };
+    let mut all = vec![default];
+    for other in others.filter(fits) {
+        if !all.contains(&other) {
+            all.push(other);
+        }
+    }
+    all
+}
+
+impl Contender {
+    /// What `gonia fill` does on a grid by itself.
+    pub fn default_of(grid: Grid) -> Self {
+        Self::blocks(Settings::DEFAULT, grid)
+    }
+
+    /// Blocks, of two steps of the grid at least.
+    fn blocks(settings: Settings, grid: Grid) -> Self {
+        Contender::Blocks(Settings {
+            block_deg: settings.block_deg.max(2.0 * grid.step_deg()),
+            ..settings
+        })
+    }
+
+    /// The paper's method.
+    pub fn paper() -> Self {
+        Contender::Cellwise(CellSettings::PAPER)
+    }
+
+    /// Whether it is [`Contender::default_of`].
+    pub fn is_default(&self, grid: Grid) -> bool {
+        *self == Self::default_of(grid)
+    }
+
+    /// Its kind.
+    pub fn family(&self) -> Family {
+        match self {
+            Contender::Blocks(_) => Family::Blocks,
+            Contender::Cellwise(settings) => match settings.rule {
+                Rule::Nearest | Rule::Shepard { .. } => Family::Distance,
+                Rule::MovingLeastSquares { .. } => Family::LeastSquares,
+                Rule::Rbf { kernel, .. } if kernel.name() == "linear" => Family::Linear,
+                Rule::Rbf { .. } => Family::Rbf,
+            },
+        }
+    }
+
+    /// Gives cells (a pair of direction indices each, poles at azimuth 0) their values.
+    pub(super) fn run(&self, bins: &Bins, cells: &[(u32, u32)]) -> Result<Run, FillError> {
+        match self {
+            Contender::Cellwise(settings) => run_cellwise(bins, settings, cells),
+            Contender::Blocks(settings) => run_blocks(bins, settings, cells),
+        }
+    }
+}
+
+fn run_cellwise(
+    bins: &Bins,
+    settings: &CellSettings,
+    cells: &[(u32, u32)],
+) -> Result<Run, FillError> {
+    let start = cpu_seconds();
+    let filler = CellFiller::new(bins, settings)?;
+    let built = cpu_seconds();
+    let values = cells
+        .par_iter()
+        // Cells differ in cost; small pieces keep all threads at work to the end.
+        .with_max_len(16)
+        .map_init(Workspace::default, |work, (light, view)| {
+            filler.pair(*light as usize, *view as usize, work)
+        })
+        .collect();
+    let worked = cpu_seconds() - built;
+    let tally = filler.tally();
+    let done = tally.interpolated.max(1) as f64;
+    let all = n_interpolated(bins, settings.mirrored) as f64;
+    Ok(Run {
+        values,
+        core_s: built - start + worked * all / done,
+        share: done / all,
+        failed: tally.failed as f64 / done,
+    })
+}
+
+fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
+    let start = cpu_seconds();
+    let known = Known::thinned(bins, base.one_bin_in);
+    let settings = interpolate::select(&known, *base).settings;
+    let dense = interpolate::fill(&known, &settings, &|_| ())?;
+    let core_s = cpu_seconds() - start;
+    let at = |(light, view): &(u32, u32)| dense.at(*light as usize, *view as usize);
+    Ok(Run {
+        values: cells.iter().map(at).collect(),
+        core_s,
+        share: 1.0,
+        failed: 0.0,
+    })
+}
+
+impl fmt::Display for Contender {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Contender::Cellwise(settings) => settings.fmt(f),
+            Contender::Blocks(settings) => {
+                let Settings {
+                    block_deg,
+                    nodes,
+                    tolerance,
+                    budget,
+                    one_bin_in,
+                    ..
+                } = settings;
+                write!(f, "blocks={block_deg},nodes={nodes},tolerance={tolerance}")?;
+                if budget.is_finite() {
+                    write!(f, ",budget={budget}")?;
+                }
+                if *one_bin_in > 1 {
+                    write!(f, ",one-bin-in={one_bin_in}")?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl FromStr for Contender {
+    type Err = SettingsError;
+
+    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
+    fn from_str(text: &str) -> Result<Self, SettingsError> {
+        let blocks = || {
+            let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
+            let (nodes, rest) = rest.split_once(",tolerance=")?;
+            let (rest, one_bin_in) = rest.split_once(",one-bin-in=").unwrap_or((rest, "1"));
+            let (tolerance, budget) = rest.split_once(",budget=").unwrap_or((rest, "inf"));
+            let block_deg = block.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
+            let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
+            let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
+            let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
+            let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
+            Some(Contender::Blocks(Settings {
+                block_deg,
+                nodes,
+                tolerance,
+                budget,
+                one_bin_in,
+                ..Settings::DEFAULT
+            }))
+        };
+        blocks().map_or_else(|| text.parse().map(Contender::Cellwise), Ok)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_standard_contender_has_a_name_of_its_own_and_one_is_the_default() {
+        for step in [2.0, 5.0] {
+            let grid = Grid::with_step_deg(step).unwrap();
+            let all = standard(grid);
+            assert!(all.len() > CELLWISE.len());
+            let mut names: Vec<String> = all.iter().map(|c| c.to_string()).collect();
+            assert_eq!(names[names.len() - CELLWISE.len()], "paper");
+            assert!(CELLWISE.iter().all(|name| names.contains(&(*name).into())));
+            for (name, contender) in names.iter().zip(&all) {
+                assert_eq!(name.parse().as_ref(), Ok(contender));
+            }
+            names.sort();
+            names.dedup();
+            assert_eq!(names.len(), all.len());
+            assert_eq!(all.iter().filter(|c| c.is_default(grid)).count(), 1);
+        }
+    }
+}

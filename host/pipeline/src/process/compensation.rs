@@ -1,0 +1,152 @@
+//! What a radiance must be multiplied with to be a BRDF: eq. (3) and its two simpler kin.
+//!
+//! Everywhere radiance comes divided by the ideal point light's irradiance E at its own place, so
+//! that I/E is the BRDF times what the light departs from the ideal, the reference's I_R/E likewise,
+//! and the local cos θi of eq. (3) is in E.
+
+use crate::process::ReferenceSummary;
+use crate::process::account::LeftOutCounts;
+use crate::process::central::{CentralField, fit_central};
+use crate::process::coverage::{CoverageError, check_central, check_matches};
+use crate::process::masks::Masks;
+use crate::process::reference::{ReferenceFrame, References};
+use crate::process::reflectance::KnownReference;
+use gonia_brdf::{Pose, Vec3};
+use gonia_imaging::Mask;
+use gonia_rig::{FrameRow, Rig};
+
+/// How light and beam were compensated for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compensation {
+    /// By a reference of known reflectance: f = (I/I_R)·ρ/π, in 1/sr.
+    KnownReference,
+    /// By an unknown reference measured over the whole plan: eq. (3), relative to the irradiance
+    /// at the target's centre at normal incidence.
+    UnknownReference,
+    /// By an ideal point light over the rig's geometry: relative.
+    GeometricModel,
+}
+
+impl Compensation {
+    /// Whether values are in 1/sr.
+    pub fn is_absolute(self) -> bool {
+        self == Self::KnownReference
+    }
+}
+
+/// Compensates the samples of one session.
+pub struct Compensator {
+    references: References,
+    /// Number of poses in the central field.
+    central: usize,
+    method: Method,
+}
+
+enum Method {
+    Known(KnownReference),
+    Unknown(Box<CentralField>),
+    Geometric,
+}
+
+impl Compensator {
+    /// Chooses the method from what there is, and prepares it. `centre` is the index of the grid's
+    /// middle point.
+    pub fn new(
+        rig: &Rig,
+        centre: usize,
+        references: References,
+        material: &[&FrameRow],
+    ) -> Result<Self, CoverageError> {
+        let mut central = 0;
+        let method = match &rig.reference {
+            _ if references.frames().is_empty() => Method::Geometric,
+            Some(reference) => Method::Known(KnownReference::new(reference)),
+            None => {
+                let matched: Vec<_> = material
+                    .iter()
+                    .map(|row| (row.frame, references.at_pose(row.pose).is_some()))
+                    .collect();
+                check_matches(&matched)?;
+                let values = central_values(&references, centre);
+                let poses: Vec<Pose> = values.iter().map(|v| v.0).collect();
+                check_central(&poses)?;
+                central = values.len();
+                let field = fit_central(&values).ok_or(CoverageError::TooFewPoses { poses: 0 })?;
+                Method::Unknown(Box::new(field))
+            }
+        };
+        Ok(Self {
+            references,
+            central,
+            method,
+        })
+    }
+
+    /// Which method it is.
+    pub fn kind(&self) -> Compensation {
+        match self.method {
+            Method::Known(_) => Compensation::KnownReference,
+            Method::Unknown(_) => Compensation::UnknownReference,
+            Method::Geometric => Compensation::GeometricModel,
+        }
+    }
+
+    /// Whether a material frame is of no use without a reference frame at its pose.
+    pub fn needs_reference(&self) -> bool {
+        !matches!(self.method, Method::Geometric)
+    }
+
+    /// The reference frame for a reading of the arms.
+    pub fn reference_at(&self, pose: Pose) -> Option<&ReferenceFrame> {
+        self.references.at_pose(pose)
+    }
+
+    /// What the reference's frames gave.
+    pub fn summary(&self) -> ReferenceSummary {
+        let frames = self.references.frames();
+        ReferenceSummary {
+            frames: frames.len(),
+            occluded: frames.iter().filter(|f| f.mask.is_some()).count(),
+            mask_bytes: frames
+                .iter()
+                .filter_map(|f| f.mask.as_ref())
+                .map(Mask::bytes)
+                .sum(),
+            central: self.central,
+        }
+    }
+
+    /// What hid the target in the reference's frames.
+    pub fn into_masks(self) -> Masks {
+        Masks::new(self.references.into_masks())
+    }
+
+    /// The BRDF at a grid point from its radiance over the ideal irradiance; `None`, and counted,
+    /// where the reference has no value.
+    pub fn value(
+        &self,
+        relative: [f32; 3],
+        reference: Option<&ReferenceFrame>,
+        point: usize,
+        (light, view): (Vec3, Vec3),
+        counts: &mut LeftOutCounts,
+    ) -> Option<[f32; 3]> {
+        let factor = match &self.method {
+            Method::Geometric => return Some(relative),
+            Method::Known(reference) => reference.at(light, view),
+            Method::Unknown(field) => field.at(light, view),
+        };
+        let beneath = reference?.at(point, counts)?;
+        Some([0, 1, 2].map(|c| relative[c] / beneath[c] * factor[c]))
+    }
+}
+
+/// I_C / cos θi: the reference's values at the centre, wherever it was seen.
+fn central_values(references: &References, centre: usize) -> Vec<(Pose, [f32; 3])> {
+    references
+        .frames()
+        .iter()
+        .map(|frame| (frame.pose, frame.relative[centre]))
+        .filter(|(_, value)| value.iter().all(|v| *v > 0.0))
+        .collect()
+}

@@ -1,0 +1,379 @@
+//! From frames to samples: registration, occlusion, sampling, compensation by the reference.
+//!
+//! Two passes over the frames, each parallel: first the reference's, of which only the values at
+//! the grid points are kept, then the material's, of which only the samples are.
+
+pub mod account;
+pub mod central;
+mod compensation;
+pub mod coverage;
+pub mod masks;
+mod reference;
+mod reflectance;
+pub mod sampled;
+pub mod source;
+
+pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
+pub use compensation::Compensation;
+pub use masks::Masks;
+pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
+pub use source::{FrameRow, FrameSource, Role};
+
+use compensation::Compensator;
+use gonia_brdf::direction::local_direction;
+use gonia_brdf::{Direction, Sample};
+use gonia_formats::FileError;
+use gonia_imaging::SamplingGrid;
+use gonia_imaging::ideal_light::IdealLight;
+use gonia_rig::{Frame, Rig};
+use rayon::prelude::*;
+use reference::{ReferenceFrame, References};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What [`process`] is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Frames of the reference.
+    Reference,
+    /// Frames of the material.
+    Material,
+}
+
+/// All samples of a session and how they came about.
+#[derive(Clone, Debug)]
+pub struct Processed {
+    /// The samples, in the order of the frames.
+    pub samples: Vec<Sample>,
+    /// How the light was compensated for, and with it what unit the values have.
+    pub compensation: Compensation,
+    /// Every frame, the reference's first.
+    pub frames: Vec<FrameReport>,
+    /// Points of used material frames that became no sample.
+    pub left_out: LeftOutCounts,
+    /// Estimated camera direction minus reading, over the locked frames.
+    pub offsets: OffsetStatistics,
+    /// The reference.
+    pub reference: ReferenceSummary,
+    /// What hid the target in the reference's frames.
+    pub masks: Masks,
+}
+
+/// What the reference's frames gave.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReferenceSummary {
+    /// Frames that were used.
+    pub frames: usize,
+    /// Of them, frames in which something hid part of the material.
+    pub occluded: usize,
+    /// Memory of all occlusion masks, bytes.
+    pub mask_bytes: usize,
+    /// Poses whose central value was used for eq. (3).
+    pub central: usize,
+}
+
+/// Why no samples could be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcessError {
+    /// There is nothing to process.
+    #[error("none of the {rows} frames shows the material: give rows of role 'material'")]
+    NoMaterial {
+        /// Rows of the source.
+        rows: usize,
+    },
+    /// A frame could not be read.
+    #[error("frame {frame}: {source}")]
+    Load {
+        /// Its number.
+        frame: u32,
+        /// What is wrong, and with which file.
+        source: FileError,
+    },
+    /// A frame is not of the size that the rig's camera has.
+    #[error(
+        "frame {frame} ({file}) has {width} x {height} pixels, but the camera of rig.toml has {rig_width} x {rig_height}: correct width_px, height_px, focal_px and centre_px, or the file"
+    )]
+    WrongSize {
+        /// Its number.
+        frame: u32,
+        /// Its file.
+        file: String,
+        /// Its width.
+        width: usize,
+        /// Its height.
+        height: usize,
+        /// The camera's width.
+        rig_width: usize,
+        /// The camera's height.
+        rig_height: usize,
+    },
+    /// There are frames of the reference, and none of them is any good.
+    #[error(
+        "none of the {refused} frames of the reference shows the target where its pose puts it: check rig.toml and the poses in frames.csv, or leave the reference's rows out to use an ideal light instead"
+    )]
+    ReferenceRefused {
+        /// Frames of the reference.
+        refused: usize,
+    },
+    /// Eq. (3) needs more of the reference than was measured.
+    #[error(transparent)]
+    Coverage(#[from] coverage::CoverageError),
+}
+
+/// Frames in work at a time; what they leave is gathered in their order.
+const BATCH: usize = 256;
+
+/// Makes samples from frames. The compensation follows from what there is: a reference of known
+/// albedo, an unknown one (eq. (3)), or none. `progress` is told the stage, the frames done and
+/// their number, from any thread.
+pub fn process(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+) -> Result<Processed, ProcessError> {
+    process_with_masks(rig, source, &Masks::default(), progress)
+}
+
+/// As [`process`], with the masks of another session's reference for the poses at which this one has
+/// no reference frame; where those have none either, the material's own frame must tell.
+pub fn process_with_masks(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    masks: &Masks,
+    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+) -> Result<Processed, ProcessError> {
+    let sampler = FrameSampler::new(rig);
+    let sampled = |row: &FrameRow, hidden: Hidden| {
+        let frame = load(rig, source, row)?;
+        Ok(sampler.sample(&frame, row, hidden))
+    };
+    process_sampled(rig, source.rows(), &sampled, masks, progress)
+}
+
+/// How a frame is had sampled, from any thread.
+pub type Sampled<'a> = &'a (dyn Fn(&FrameRow, Hidden) -> Result<SampledFrame, ProcessError> + Sync);
+
+/// As [`process_with_masks`], of frames that come sampled: a session's are kept so.
+pub fn process_sampled(
+    rig: &Rig,
+    rows: &[FrameRow],
+    sampled: Sampled,
+    masks: &Masks,
+    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+) -> Result<Processed, ProcessError> {
+    let of_role = |role| -> Vec<&FrameRow> { rows.iter().filter(|r| r.role == role).collect() };
+    let (material, reference) = (of_role(Role::Material), of_role(Role::Reference));
+    if material.is_empty() {
+        return Err(ProcessError::NoMaterial { rows: rows.len() });
+    }
+    let bench = Bench {
+        rig,
+        sampled,
+        masks,
+        grid: SamplingGrid::new(rig),
+    };
+    let mut frames = Vec::with_capacity(rows.len());
+    let mut references = Vec::new();
+    bench.each(
+        Stage::Reference,
+        &reference,
+        progress,
+        |row| bench.reference(row),
+        |(report, found)| {
+            frames.push(report);
+            references.extend(found);
+        },
+    )?;
+    if references.is_empty() && !reference.is_empty() {
+        let refused = reference.len();
+        return Err(ProcessError::ReferenceRefused { refused });
+    }
+    let compensator = Compensator::new(
+        rig,
+        bench.grid.centre(),
+        References::new(references),
+        &material,
+    )?;
+    let mut samples = Vec::with_capacity(material.len() * bench.grid.points_mm().len());
+    let mut left_out = LeftOutCounts::default();
+    bench.each(
+        Stage::Material,
+        &material,
+        progress,
+        |row| bench.material(row, &compensator),
+        |(report, found, counts): (FrameReport, Vec<Sample>, LeftOutCounts)| {
+            frames.push(report);
+            samples.extend(found);
+            left_out += counts;
+        },
+    )?;
+    Ok(Processed {
+        offsets: OffsetStatistics::of(&frames),
+        samples,
+        compensation: compensator.kind(),
+        frames,
+        left_out,
+        reference: compensator.summary(),
+        masks: compensator.into_masks(),
+    })
+}
+
+/// Loads a frame, which must be of the size that the rig's camera has.
+fn load(rig: &Rig, source: &dyn FrameSource, row: &FrameRow) -> Result<Frame, ProcessError> {
+    let frame = source.load(row).map_err(|source| ProcessError::Load {
+        frame: row.frame,
+        source,
+    })?;
+    let camera = &rig.camera;
+    if [frame.width, frame.height] != [camera.width_px, camera.height_px] {
+        return Err(ProcessError::WrongSize {
+            frame: row.frame,
+            file: row.file.clone(),
+            width: frame.width,
+            height: frame.height,
+            rig_width: camera.width_px,
+            rig_height: camera.height_px,
+        });
+    }
+    Ok(frame)
+}
+
+/// What every frame needs.
+struct Bench<'a> {
+    rig: &'a Rig,
+    sampled: Sampled<'a>,
+    masks: &'a Masks,
+    grid: SamplingGrid,
+}
+
+impl Bench<'_> {
+    /// Does `work` on rows in parallel, and `gather`s what it gives in their order.
+    fn each<T: Send>(
+        &self,
+        stage: Stage,
+        rows: &[&FrameRow],
+        progress: &(dyn Fn(Stage, usize, usize) + Sync),
+        work: impl Fn(&FrameRow) -> Result<T, ProcessError> + Sync,
+        mut gather: impl FnMut(T),
+    ) -> Result<(), ProcessError> {
+        let done = AtomicUsize::new(0);
+        for batch in rows.chunks(BATCH) {
+            let results = batch
+                .par_iter()
+                .map(|row| {
+                    let result = work(row)?;
+                    progress(stage, 1 + done.fetch_add(1, Ordering::Relaxed), rows.len());
+                    Ok(result)
+                })
+                .collect::<Vec<Result<T, ProcessError>>>();
+            // In order: of several bad frames the first one is named, whichever thread met one first.
+            for result in results {
+                gather(result?);
+            }
+        }
+        Ok(())
+    }
+
+    fn reference(
+        &self,
+        row: &FrameRow,
+    ) -> Result<(FrameReport, Option<ReferenceFrame>), ProcessError> {
+        let frame = (self.sampled)(row, Hidden::Find)?;
+        let report = frame.report;
+        if let Outcome::Refused(_) = report.outcome {
+            return Ok((report, None));
+        }
+        let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
+        let irradiance = |i, value: &SampledPoint| light.irradiance(self.place(i, value));
+        Ok((report, Some(ReferenceFrame::new(frame, irradiance))))
+    }
+
+    fn material(
+        &self,
+        row: &FrameRow,
+        compensator: &Compensator,
+    ) -> Result<(FrameReport, Vec<Sample>, LeftOutCounts), ProcessError> {
+        let reference = compensator.reference_at(row.pose);
+        // What hid the reference hid the material, and those points are left out already. Without
+        // both, the material's own frame must tell.
+        let hidden = match (reference, self.masks.at(row.pose)) {
+            (Some(_), _) => Hidden::Known(None),
+            (None, Some(known)) => Hidden::Known(known),
+            (None, None) => Hidden::Find,
+        };
+        let frame = (self.sampled)(row, hidden)?;
+        let view = frame.view;
+        let mut report = frame.report;
+        let mut counts = LeftOutCounts::default();
+        if let Outcome::Refused(_) = report.outcome {
+            return Ok((report, Vec::new(), counts));
+        }
+        if reference.is_none() && compensator.needs_reference() {
+            report.outcome = Outcome::Refused(Refusal::NoReference);
+            return Ok((report, Vec::new(), counts));
+        }
+        let points = frame.points;
+        let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
+        let mut samples = Vec::with_capacity(points.len());
+        for (i, point) in points.iter().enumerate() {
+            let value = match point {
+                Ok(value) => value,
+                Err(reason) => {
+                    counts.count(*reason);
+                    continue;
+                }
+            };
+            let at = self.place(i, value);
+            let irradiance = light.irradiance(at);
+            if irradiance <= 0.0 {
+                counts.below_horizon += 1;
+                continue;
+            }
+            let (to_light, to_camera) = self.directions(row.pose.light, view, at);
+            let relative = value.rgb.map(|v| v / irradiance as f32);
+            let Some(rgb) =
+                compensator.value(relative, reference, i, (to_light, to_camera), &mut counts)
+            else {
+                continue;
+            };
+            let (i, v) = (
+                Direction::from_vec3(to_light),
+                Direction::from_vec3(to_camera),
+            );
+            samples.push(Sample {
+                theta_i_deg: i.theta_deg() as f32,
+                phi_i_deg: phi_f32(i),
+                theta_v_deg: v.theta_deg() as f32,
+                phi_v_deg: phi_f32(v),
+                rgb,
+                frame: row.frame,
+            });
+        }
+        Ok((report, samples, counts))
+    }
+
+    /// Where on the target a point's pixels were, mm.
+    fn place(&self, point: usize, value: &SampledPoint) -> [f64; 2] {
+        let at = self.grid.points_mm()[point];
+        [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]))
+    }
+
+    /// Unit vectors from a point of the target (mm) to light and camera: eqs. (1) and (2).
+    fn directions(
+        &self,
+        light: Direction,
+        view: Direction,
+        at_mm: [f64; 2],
+    ) -> (gonia_brdf::Vec3, gonia_brdf::Vec3) {
+        let at = at_mm.map(|c| c * 1e-3);
+        (
+            local_direction(light, self.rig.light.distance_m, at),
+            local_direction(view, self.rig.camera.distance_m, at),
+        )
+    }
+}
+
+/// φ in [0, 360) in single precision too, where 359.99999 rounds to 360.
+fn phi_f32(d: Direction) -> f32 {
+    let phi = d.phi_deg() as f32;
+    if phi >= 360.0 { 0.0 } else { phi }
+}

@@ -1,0 +1,108 @@
+//! A frame once it has been registered and sampled: all that the samples need of it, at a hundredth
+//! of its size. A session keeps these as its frames arrive.
+
+use crate::process::account::{FrameReport, Outcome};
+use gonia_brdf::{Direction, Pose};
+use gonia_imaging::occlusion::find_occlusion;
+use gonia_imaging::{LeftOut, Mask, Registrar, Registration, SamplingGrid};
+use gonia_rig::{Frame, FrameRow, Rig};
+
+/// What one grid point shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledPoint {
+    /// Median radiance per channel.
+    pub rgb: [f32; 3],
+    /// Where the pixels were, relative to the grid point, mm.
+    pub offset_mm: [f32; 2],
+}
+
+/// The grid points of a frame, and how the frame came to be used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledFrame {
+    /// Its number, role and registration.
+    pub report: FrameReport,
+    /// The arms' reading.
+    pub reading: Pose,
+    /// The camera's direction as its marks tell it.
+    pub view: Direction,
+    /// In the order of the rig's grid; none when the frame was refused.
+    pub points: Vec<Result<SampledPoint, LeftOut>>,
+    /// What hid the target, where that was looked for in this frame.
+    pub mask: Option<Mask>,
+}
+
+/// How it is known what hides the target in a frame.
+#[derive(Clone, Copy, Debug)]
+pub enum Hidden<'a> {
+    /// The frame itself must tell.
+    Find,
+    /// By this mask. Also none, where the reference's frame will leave its hidden points out.
+    Known(Option<&'a Mask>),
+}
+
+/// Registers and samples the frames of a rig, one by one.
+pub struct FrameSampler {
+    rig: Rig,
+    registrar: Registrar,
+    grid: SamplingGrid,
+}
+
+impl FrameSampler {
+    /// For frames of a rig.
+    pub fn new(rig: &Rig) -> Self {
+        Self {
+            rig: rig.clone(),
+            registrar: Registrar::new(rig),
+            grid: SamplingGrid::new(rig),
+        }
+    }
+
+    /// Registers a frame by its marks, and takes the value of every grid point.
+    pub fn sample(&self, frame: &Frame, row: &FrameRow, hidden: Hidden) -> SampledFrame {
+        self.sample_registered(frame, row, hidden).0
+    }
+
+    /// As [`FrameSampler::sample`], with the registration: where in the frame the target is.
+    pub fn sample_registered(
+        &self,
+        frame: &Frame,
+        row: &FrameRow,
+        hidden: Hidden,
+    ) -> (SampledFrame, Registration) {
+        let registration = self.registrar.register(frame, row.pose);
+        let report = FrameReport {
+            frame: row.frame,
+            role: row.role,
+            outcome: Outcome::of(&registration),
+            residual_px: registration.residual_px,
+            pose_offset: registration.pose_offset,
+        };
+        let mut sampled = SampledFrame {
+            report,
+            reading: row.pose,
+            view: registration.view,
+            points: Vec::new(),
+            mask: None,
+        };
+        if let Outcome::Refused(_) = report.outcome {
+            return (sampled, registration);
+        }
+        let mask = match hidden {
+            Hidden::Find => {
+                sampled.mask = find_occlusion(frame, &registration, row.pose.light, &self.rig);
+                sampled.mask.as_ref()
+            }
+            Hidden::Known(mask) => mask,
+        };
+        let points = self.grid.sample(frame, &registration, mask).into_iter();
+        sampled.points = points
+            .map(|point| {
+                point.map(|value| SampledPoint {
+                    rgb: value.rgb,
+                    offset_mm: value.offset_mm,
+                })
+            })
+            .collect();
+        (sampled, registration)
+    }
+}

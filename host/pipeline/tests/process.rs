@@ -1,0 +1,409 @@
+//! The whole chain from frames to samples against the simulator's truth.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use gonia_brdf::model::Kurt;
+use gonia_brdf::{Brdf, Direction, Pose, Sample};
+use gonia_formats::FileError;
+use gonia_pipeline::process::*;
+use gonia_rig::{Frame, FrameRow, Reference, Rig, Role};
+use gonia_sim::scene::Scene;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A source that renders its frames, at shaft angles a little off the reading.
+struct Rendered {
+    scene: Scene,
+    rows: Vec<FrameRow>,
+    error_deg: f64,
+}
+
+impl Rendered {
+    fn new(scene: Scene) -> Self {
+        Self {
+            scene,
+            rows: Vec::new(),
+            error_deg: 0.01,
+        }
+    }
+
+    fn add(&mut self, role: Role, angles: [f64; 4]) {
+        let frame = self.rows.len() as u32;
+        self.rows.push(FrameRow {
+            frame,
+            role,
+            pose: Pose::from_deg(angles),
+            file: format!("frames/{frame:06}.exr"),
+        });
+    }
+
+    fn run(&self) -> Result<Processed, ProcessError> {
+        process(&self.scene.geometry.to_rig(), self, &|_, _, _| ())
+    }
+}
+
+impl FrameSource for Rendered {
+    fn rows(&self) -> &[FrameRow] {
+        &self.rows
+    }
+
+    fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
+        let which = match row.role {
+            Role::Material => Role::Material,
+            Role::Reference => Role::Reference,
+        };
+        if row.pose == Pose::from_deg(UNREADABLE) {
+            return Err(FileError::new(
+                std::path::Path::new(&row.file),
+                "the file is truncated",
+                "copy it again",
+            ));
+        }
+        if row.pose == Pose::from_deg(BLIND) {
+            let [width, height] = [self.scene.geometry.width_px, self.scene.geometry.height_px];
+            return Ok(Frame {
+                width,
+                height,
+                rgb: vec![[0.2; 3]; width * height],
+            });
+        }
+        // ±1 or 0 times the error, different for each shaft and frame.
+        let wobble =
+            |k: u32| (f64::from((row.frame * 7 + k * 5) % 3) - 1.0) * self.error_deg.to_radians();
+        let mut at = row.pose;
+        at.light.theta += wobble(0);
+        at.light.phi += wobble(1);
+        at.view.theta += wobble(2);
+        at.view.phi += wobble(3);
+        Ok(self.scene.frame(which, at, u64::from(row.frame)))
+    }
+}
+
+/// A pose at which the source shows a blank wall.
+const BLIND: [f64; 4] = [10.0, 10.0, 10.0, 10.0];
+/// A pose whose frame cannot be read.
+const UNREADABLE: [f64; 4] = [20.0, 20.0, 20.0, 20.0];
+
+const POSES: [[f64; 4]; 6] = [
+    [0.0, 0.0, 30.0, 300.0],
+    [30.0, 60.0, 15.0, 180.0],
+    [45.0, 200.0, 60.0, 20.0],
+    [60.0, 90.0, 45.0, 250.0],
+    [75.0, 15.0, 75.0, 120.0],
+    [15.0, 120.0, 75.0, 300.0],
+];
+
+/// Logarithmic errors of one frame's samples, green channel.
+struct FrameError {
+    frame: u32,
+    samples: usize,
+    bias: f64,
+    scatter: f64,
+}
+
+fn errors(processed: &Processed, truth: &dyn Brdf) -> Vec<FrameError> {
+    let mut frames: Vec<u32> = processed.samples.iter().map(|s| s.frame).collect();
+    frames.dedup();
+    let of_frame = |frame: u32| {
+        let logs: Vec<f64> = processed
+            .samples
+            .iter()
+            .filter(|s| s.frame == frame)
+            .map(|s| {
+                let at = |t: f32, p: f32| Direction::from_deg(t.into(), p.into()).to_vec3();
+                let light = at(s.theta_i_deg, s.phi_i_deg);
+                let f = truth.eval(light, at(s.theta_v_deg, s.phi_v_deg));
+                (f64::from(s.rgb[1]) / f[1]).ln()
+            })
+            .collect();
+        let n = logs.len() as f64;
+        let bias = logs.iter().sum::<f64>() / n;
+        FrameError {
+            frame,
+            samples: logs.len(),
+            bias,
+            scatter: (logs.iter().map(|l| (l - bias).powi(2)).sum::<f64>() / n).sqrt(),
+        }
+    };
+    frames.into_iter().map(of_frame).collect()
+}
+
+/// The paper's rings up to `theta_max`, every `thin`-th direction of each.
+fn rings(theta_max: f64, thin: usize) -> Vec<[f64; 2]> {
+    [
+        (0.0, 1),
+        (15.0, 6),
+        (30.0, 12),
+        (45.0, 18),
+        (60.0, 20),
+        (75.0, 24),
+        (85.0, 24),
+    ]
+    .into_iter()
+    .filter(|(theta, _)| *theta <= theta_max)
+    .flat_map(|(theta, n)| {
+        (0..n)
+            .step_by(thin.min(n))
+            .map(move |i| [theta, 360.0 * i as f64 / n as f64])
+    })
+    .collect()
+}
+
+const ALBEDO: [f64; 3] = [0.9, 0.85, 0.8];
+
+/// A scene with a Lambertian reference, its rig that knows the albedo, and one frame of material
+/// and reference at each pose.
+fn lambertian(px: usize) -> (Rendered, Rig) {
+    let mut scene = Scene::of_fabric(px);
+    scene.reference = Arc::new(Kurt::new(ALBEDO, &[]));
+    let mut rig = scene.geometry.to_rig();
+    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    let mut source = Rendered::new(scene);
+    for angles in POSES {
+        source.add(Role::Reference, angles);
+        source.add(Role::Material, angles);
+    }
+    (source, rig)
+}
+
+#[test]
+fn a_known_reference_gives_absolute_values_within_the_noise() {
+    // A patch of n pixels with 1 % noise has a median good to 1.25 % / √n; two frames √2 of that.
+    for (px, limits) in [(400, [0.012; 2]), (1024, [0.005; 2])] {
+        let (source, rig) = lambertian(px);
+        let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+        assert_eq!(done.compensation, Compensation::KnownReference);
+        assert_eq!(done.samples.len(), POSES.len() * 1225);
+        assert_eq!(done.left_out, LeftOutCounts::default());
+        for error in errors(&done, source.scene.material.as_ref()) {
+            assert_eq!(error.samples, 1225);
+            assert!(
+                error.bias.abs() < 0.002,
+                "{px} {}: {}",
+                error.frame,
+                error.bias
+            );
+            assert!(
+                error.scatter < limits[0],
+                "{px} {}: {}",
+                error.frame,
+                error.scatter
+            );
+        }
+        assert_eq!(done.offsets.frames, 2 * POSES.len());
+        assert!(done.offsets.largest_deg < 0.03);
+    }
+}
+
+#[test]
+fn without_a_reference_an_ideal_light_is_assumed() {
+    let (mut source, mut rig) = lambertian(400);
+    source.rows.retain(|row| row.role == Role::Material);
+    source.scene.beam = None;
+    for reference in [rig.reference.take(), None] {
+        rig.reference = reference;
+        let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+        assert_eq!(done.compensation, Compensation::GeometricModel);
+        for error in errors(&done, source.scene.material.as_ref()) {
+            assert!(error.bias.abs() < 0.002, "{}: {}", error.frame, error.bias);
+            assert!(error.scatter < 0.01, "{}: {}", error.frame, error.scatter);
+        }
+    }
+}
+
+#[test]
+fn an_unknown_reference_over_the_plan_gives_equation_3() {
+    let mut source = Rendered::new(Scene::of_fabric(256));
+    let directions = rings(85.0, 3);
+    for light in &directions {
+        for view in directions.iter().filter(|v| v[0] < 80.0) {
+            source.add(Role::Reference, [light[0], light[1], view[0], view[1]]);
+        }
+    }
+    let material = source.rows.iter().map(|row| row.pose).collect::<Vec<_>>();
+    for pose in material.iter().step_by(79) {
+        let angles = [
+            pose.light.theta_deg(),
+            pose.light.phi_deg(),
+            pose.view.theta_deg(),
+            pose.view.phi_deg(),
+        ];
+        source.add(Role::Material, angles);
+    }
+    let done = source.run().unwrap();
+    assert_eq!(done.compensation, Compensation::UnknownReference);
+    assert!(done.reference.occluded > 0 && done.reference.mask_bytes > 0);
+    assert!(done.reference.central > 500, "{:?}", done.reference);
+    for error in errors(&done, source.scene.material.as_ref()) {
+        // A third of the plan in each azimuth: the reference's own interpolation shows.
+        assert!(error.bias.abs() < 0.02, "{}: {}", error.frame, error.bias);
+        assert!(error.scatter < 0.02, "{}: {}", error.frame, error.scatter);
+    }
+}
+
+#[test]
+fn an_unknown_reference_must_cover_the_plan() {
+    let mut source = Rendered::new(Scene::of_fabric(200));
+    for angles in POSES {
+        source.add(Role::Reference, angles);
+        source.add(Role::Material, angles);
+    }
+    let error = source.run().unwrap_err();
+    assert!(
+        matches!(
+            error,
+            ProcessError::Coverage(coverage::CoverageError::TooFewPoses { poses: 6 })
+        ),
+        "{error}"
+    );
+    source.add(Role::Material, [75.0, 100.0, 0.0, 0.0]);
+    let error = source.run().unwrap_err().to_string();
+    assert!(
+        error.starts_with("1 of 7 frames of the material"),
+        "{error}"
+    );
+    assert!(error.contains("the first is frame 12"), "{error}");
+}
+
+#[test]
+fn frames_that_cannot_be_used_are_refused_and_counted() {
+    let (mut source, rig) = lambertian(200);
+    source.add(Role::Material, [75.0, 100.0, 0.0, 0.0]);
+    let blind = source.rows.len() as u32;
+    source.add(Role::Material, BLIND);
+    source.add(Role::Reference, BLIND);
+    let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+    let outcome = |frame: u32| {
+        let of = |f: &&FrameReport| f.frame == frame;
+        done.frames.iter().find(of).unwrap().outcome
+    };
+    assert_eq!(outcome(blind - 1), Outcome::Refused(Refusal::NoReference));
+    assert!(matches!(
+        outcome(blind),
+        Outcome::Refused(Refusal::NotTheTarget(_))
+    ));
+    assert_eq!(done.frames.len(), source.rows.len());
+    assert_eq!(done.samples.len(), POSES.len() * 1225);
+    assert!(done.samples.iter().all(|s| s.frame < blind - 1));
+
+    source
+        .rows
+        .retain(|row| row.role == Role::Material || row.frame > blind);
+    let error = process(&rig, &source, &|_, _, _| ()).unwrap_err();
+    assert!(matches!(
+        error,
+        ProcessError::ReferenceRefused { refused: 1 }
+    ));
+}
+
+#[test]
+fn a_frame_that_cannot_be_read_or_has_another_size_is_named() {
+    let (mut source, mut rig) = lambertian(200);
+    rig.camera.width_px = 100;
+    let error = process(&rig, &source, &|_, _, _| ())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.starts_with("frame 0 (frames/000000.exr) has 200 x 200 pixels"),
+        "{error}"
+    );
+    rig.camera.width_px = 200;
+    source.add(Role::Reference, UNREADABLE);
+    let error = process(&rig, &source, &|_, _, _| ())
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        error,
+        "frame 12: frames/000012.exr: the file is truncated; copy it again"
+    );
+    source.rows.clear();
+    let error = process(&rig, &source, &|_, _, _| ()).unwrap_err();
+    assert!(matches!(error, ProcessError::NoMaterial { rows: 0 }));
+}
+
+#[test]
+fn samples_do_not_depend_on_the_number_of_threads_and_progress_counts_to_the_end() {
+    let (source, rig) = lambertian(200);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let ends = AtomicUsize::new(0);
+        let progress = |_, done: usize, total: usize| {
+            ends.fetch_add(usize::from(done == total), Ordering::Relaxed);
+        };
+        let done = pool.install(|| process(&rig, &source, &progress)).unwrap();
+        assert_eq!(ends.into_inner(), 2);
+        done.samples
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn masks_of_a_references_frames_serve_a_material_without_them() {
+    let mut scene = Scene::of_fabric(400);
+    scene.beam = None;
+    let rig = scene.geometry.to_rig();
+    // The head in front of the material, and a material too dark to tell by itself what hides it.
+    let hidden = [30.0, 60.0, 30.0, 60.0];
+    let mut with_reference = Rendered::new(scene.clone());
+    with_reference.add(Role::Reference, hidden);
+    with_reference.add(Role::Material, hidden);
+    let mut known = rig.clone();
+    known.reference = Some(Reference::Reflectance([0.5; 3]));
+    let first = process(&known, &with_reference, &|_, _, _| ()).unwrap();
+    assert_eq!(first.masks.len(), 1);
+    let occluded = first.left_out.occlusion;
+    assert!(occluded > 50, "{occluded}");
+
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("masks.csv");
+    first.masks.write(&path, &rig).unwrap();
+    let masks = Masks::read(&path, &rig).unwrap();
+    scene.material = Arc::new(Kurt::new([0.02; 3], &[]));
+    let mut alone = Rendered::new(scene);
+    alone.add(Role::Material, hidden);
+    alone.rows[0].frame = 1;
+    let done = process_with_masks(&rig, &alone, &masks, &|_, _, _| ()).unwrap();
+    let off = done.left_out.occlusion.abs_diff(occluded);
+    assert!(off <= 5, "{occluded}, and {}", done.left_out.occlusion);
+    let without = process(&rig, &alone, &|_, _, _| ()).unwrap();
+    assert_eq!(without.left_out.occlusion, 0);
+}
+
+#[test]
+fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
+    use gonia_rig::ReflectanceTable;
+    let (source, mut rig) = lambertian(400);
+    // The truth is Lambertian: a table of twice the albedo at 60° gives twice the value there.
+    let rows = vec![
+        (0.0, ALBEDO),
+        (40.0, ALBEDO),
+        (58.0, ALBEDO.map(|a| 2.0 * a)),
+    ];
+    rig.reference = Some(Reference::Table {
+        file: "white.csv".into(),
+        table: ReflectanceTable::ByIncidence(rows),
+    });
+    let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+    assert_eq!(done.compensation, Compensation::KnownReference);
+    for (theta, factor) in [(30.0f32, 1.0f64), (75.0, 2.0)] {
+        let truth = source.scene.material.as_ref();
+        let near = |s: &&Sample| (s.theta_i_deg - theta).abs() < 2.0;
+        let logs: Vec<f64> = done
+            .samples
+            .iter()
+            .filter(near)
+            .map(|s| {
+                let at = |t: f32, p: f32| Direction::from_deg(t.into(), p.into()).to_vec3();
+                let f = truth.eval(
+                    at(s.theta_i_deg, s.phi_i_deg),
+                    at(s.theta_v_deg, s.phi_v_deg),
+                );
+                (f64::from(s.rgb[1]) / f[1] / factor).ln()
+            })
+            .collect();
+        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+        assert!(logs.len() > 100 && mean.abs() < 0.002, "{theta}: {mean}");
+    }
+}

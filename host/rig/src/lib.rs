@@ -1,0 +1,41 @@
+//! What a rig, a pose, a frame, a scale and a figure of merit *are*: plain types without I/O, and the
+//! geometry of the camera. Every other room of the host speaks in these.
+//!
+//! | module | what it describes |
+//! |---|---|
+//! | [`Rig`] and its parts | geometry, sensor, reference, sampling, as `rig.toml` has them |
+//! | [`ArmPorts`], [`Source`], [`SessionSettings`], [`Genicam`] | the bench setup of a session |
+//! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
+//! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
+//! | [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
+//! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
+
+mod bench_setup;
+mod camera_model;
+mod cell_mask;
+mod check;
+mod dense;
+mod figures;
+mod frame;
+mod frame_row;
+mod genicam;
+mod homography;
+mod raw_frame;
+mod rig;
+mod scale;
+pub mod stratum;
+
+pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
+pub use camera_model::{CameraModel, CameraShift};
+pub use cell_mask::CellMask;
+pub use check::{RigError, check_rig};
+pub use dense::DenseFile;
+pub use figures::{Figures, StratumFigures};
+pub use frame::Frame;
+pub use frame_row::{Exposure, FrameRow, Role};
+pub use genicam::{ExposureTiming, Genicam, PixelFormat};
+pub use homography::Homography;
+pub use raw_frame::RawFrame;
+pub use rig::{Bayer, Camera, Light, Reference, ReflectanceTable, Rig, Sampling, Sensor, Target};
+pub use scale::Scale;
+pub use stratum::Stratum;

@@ -1,0 +1,225 @@
+//! `rig.toml`: where light, camera and target are.
+
+use crate::{ArmPorts, SessionSettings, Source};
+use gonia_brdf::Pose;
+use serde::{Deserialize, Serialize};
+
+/// The geometry of a rig and how its frames are sampled.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rig {
+    /// The light.
+    pub light: Light,
+    /// The camera.
+    pub camera: Camera,
+    /// The target's marks and the sample's size.
+    pub target: Target,
+    /// The reference's reflectance, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Reference>,
+    /// The sensor, where frames come as raw exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<Sensor>,
+    /// The grid of sampling points.
+    pub sampling: Sampling,
+    /// The arms' controllers, for a session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arms: Option<ArmPorts>,
+    /// Where a session's frames come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<Source>,
+    /// How a session goes, where it differs from the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session: Option<SessionSettings>,
+}
+
+/// A point source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Distance from the sample's centre, metres.
+    pub distance_m: f64,
+}
+
+/// A pinhole camera with optional radial distortion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Distance from the sample's centre, metres.
+    pub distance_m: f64,
+    /// Width of a frame, pixels.
+    pub width_px: usize,
+    /// Height of a frame, pixels.
+    pub height_px: usize,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Principal point (x, y), pixels; the centre of the top left pixel is (0.5, 0.5).
+    pub centre_px: [f64; 2],
+    /// Radial distortion, coefficient of r² (r in units of the focal length).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k1: f64,
+    /// Radial distortion, coefficient of r⁴.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k2: f64,
+}
+
+/// Four bright lines on a dark desk, and the square sample inside them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Lines at x = ±a and y = ±a: a, to the centre of the line, mm.
+    pub line_offset_mm: f64,
+    /// Width of a line, mm.
+    pub line_width_mm: f64,
+    /// Half the side of the sample, mm.
+    pub material_half_mm: f64,
+}
+
+/// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
+pub enum Reference {
+    /// A Lambertian one: albedo per channel, 0 < ρ ≤ 1.
+    Reflectance([f64; 3]),
+    /// One whose reflectance depends on direction.
+    Table {
+        /// The table's CSV, relative to the rig's folder.
+        file: String,
+        /// Its rows, once [`read_rig`](gonia_formats::rig_toml::read_rig) has read them.
+        table: ReflectanceTable,
+    },
+}
+
+/// Reflectance factors (π times the BRDF) by direction; never empty in a rig that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReflectanceTable {
+    /// By θi in degrees, in order.
+    ByIncidence(Vec<(f64, [f64; 3])>),
+    /// By light and view. A reference is taken as isotropic and reciprocal.
+    ByPose(Vec<(Pose, [f64; 3])>),
+}
+
+/// The keys of `[reference]`.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReferenceKeys {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reflectance: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    table: Option<String>,
+}
+
+impl TryFrom<ReferenceKeys> for Reference {
+    type Error = &'static str;
+
+    fn try_from(keys: ReferenceKeys) -> Result<Self, Self::Error> {
+        match (keys.reflectance, keys.table) {
+            (Some(rho), None) => Ok(Self::Reflectance(rho)),
+            (None, Some(file)) => Ok(Self::Table {
+                file,
+                table: ReflectanceTable::ByIncidence(Vec::new()),
+            }),
+            _ => Err("[reference] needs either reflectance or table"),
+        }
+    }
+}
+
+impl From<Reference> for ReferenceKeys {
+    fn from(reference: Reference) -> Self {
+        let (reflectance, table) = match reference {
+            Reference::Reflectance(rho) => (Some(rho), None),
+            Reference::Table { file, .. } => (None, Some(file)),
+        };
+        Self { reflectance, table }
+    }
+}
+
+/// A linear sensor, for frames whose rows in `frames.csv` have an exposure time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// Counts without light.
+    pub black_counts: f64,
+    /// Counts at and above which the sensor is no longer linear.
+    pub saturation_counts: f64,
+    /// Electrons a count: what shot noise follows from.
+    pub gain_e_per_count: f64,
+    /// Standard deviation of the read noise, electrons.
+    pub read_noise_e: f64,
+    /// The colour filters; without them a grey frame is that of a mono sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bayer: Option<Bayer>,
+}
+
+/// Colour filters of the top left 2 × 2 photosites, row by row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+#[allow(missing_docs)]
+pub enum Bayer {
+    Rggb,
+    Bggr,
+    Grbg,
+    Gbrg,
+}
+
+impl Bayer {
+    /// Channel (0 red, 1 green, 2 blue) by row and column.
+    pub fn colors(self) -> [[usize; 2]; 2] {
+        match self {
+            Bayer::Rggb => [[0, 1], [1, 2]],
+            Bayer::Bggr => [[2, 1], [1, 0]],
+            Bayer::Grbg => [[1, 0], [2, 1]],
+            Bayer::Gbrg => [[1, 2], [0, 1]],
+        }
+    }
+}
+
+/// The sampling points of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sampling {
+    /// Points lie within this distance of the centre, mm.
+    pub disc_radius_mm: f64,
+    /// Distance between points, mm.
+    pub grid_mm: f64,
+    /// Side of the square whose median is a point's value, mm.
+    pub patch_mm: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+impl Rig {
+    /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
+    /// elevation up to 75°.
+    pub fn paper(px: usize) -> Self {
+        Self {
+            light: Light { distance_m: 1.1 },
+            camera: Camera {
+                distance_m: 1.8,
+                width_px: px,
+                height_px: px,
+                focal_px: 1600.0 / 1024.0 * px as f64,
+                centre_px: [px as f64 / 2.0; 2],
+                k1: 0.0,
+                k2: 0.0,
+            },
+            target: Target {
+                line_offset_mm: 335.0,
+                line_width_mm: 4.0,
+                material_half_mm: 320.0,
+            },
+            reference: None,
+            sensor: None,
+            sampling: Sampling {
+                disc_radius_mm: 277.0,
+                grid_mm: 14.0,
+                patch_mm: 14.0,
+            },
+            arms: None,
+            source: None,
+            session: None,
+        }
+    }
+}

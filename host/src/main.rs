@@ -1,5 +1,0 @@
-//! `gonia`: see `gonia --help`.
-
-fn main() -> std::process::ExitCode {
-    gonia::cli::run()
-}
