@@ -69,11 +69,11 @@ impl Chart {
         if !(100..=1_000_000).contains(&self.tests) {
             bail!("--tests {}: must lie in 100..=1000000", self.tests);
         }
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(path))?;
         check_writable(&self.out)?;
         let (samples, judge) = self
-            .judge(samples, grid, &mut progress)
+            .judge(samples, grid, &progress)
             .with_context(|| path.display().to_string())?;
         println!("judged by {}", judge.basis());
         if self.only != Some(Only::Images) {
@@ -112,7 +112,7 @@ impl Chart {
         &self,
         samples: Vec<Sample>,
         grid: Grid,
-        progress: &mut Progress,
+        progress: &Progress,
     ) -> Result<(Vec<Sample>, Judge)> {
         let counts = TestCounts {
             spread: self.tests,

@@ -1,8 +1,7 @@
 //! `gonia chart --motion`: the arms' speed against their accuracy.
 
-use crate::plan::travelling;
 use anyhow::Result;
-use gonia_acquire::capture::POINTING_LIMIT_DEG;
+use gonia_acquire::capture::{POINTING_LIMIT_DEG, travelling};
 use gonia_acquire::motion::{JerkRow, MotionRow, jerk_rows, motion_chart, motion_rows};
 use gonia_brdf::Pose;
 use gonia_formats::{check_writable, write_whole_bytes};

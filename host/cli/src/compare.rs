@@ -3,9 +3,7 @@
 use anyhow::Result;
 use gonia_formats::dense_exr::read_dense;
 use gonia_formats::write_whole_bytes;
-use gonia_pipeline as evaluate;
-use gonia_pipeline::compare::Table;
-use gonia_pipeline::{Options, Side};
+use gonia_pipeline::{Options, Side, Table, compare};
 use std::path::PathBuf;
 
 /// Prints the error figures of A against B by stratum. Where either is relative, one factor is
@@ -28,21 +26,12 @@ impl Compare {
         let a = read_dense(&self.a)?;
         let b = read_dense(&self.b)?;
         let (name_a, name_b) = (self.a.display().to_string(), self.b.display().to_string());
-        let figures = evaluate::compare(
-            Table {
-                brdf: &a.brdf,
-                scale: a.scale,
-            },
-            Side::Table(Table {
-                brdf: &b.brdf,
-                scale: b.scale,
-            }),
-            &Options {
-                name_a: &name_a,
-                name_b: &name_b,
-                ..Options::default()
-            },
-        )?;
+        let options = Options {
+            name_a: &name_a,
+            name_b: &name_b,
+            ..Options::default()
+        };
+        let figures = compare(Table::from(&a), Side::Table(Table::from(&b)), &options)?;
         print!("{figures}");
         if let Some(path) = &self.csv {
             write_whole_bytes(path, figures.to_csv().as_bytes())?;

@@ -1,21 +1,15 @@
 //! `gonia fit`: an analytic model fitted to a dense BRDF.
 
 use crate::progress::Progress;
-use crate::provenance::of_this_program;
 use crate::table;
 use anyhow::{Context, Result, bail};
-use gonia_brdf::fit::{self, Cell, Family, Loss, Settings};
-use gonia_brdf::{Bins, DenseBrdf};
-use gonia_formats::check_writable;
-use gonia_formats::dense_exr::{read_dense, write_dense};
+use gonia_brdf::fit::{Family, Loss, Settings};
+use gonia_formats::check_writable_beside;
+use gonia_formats::dense_exr::read_dense;
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::samples::read_samples;
-use gonia_pipeline as evaluate;
-use gonia_pipeline::compare::Table;
-use gonia_pipeline::{Options, Side};
-use gonia_rig::{DenseFile, Figures, Scale};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model, five_digits, write_fit};
+use std::path::PathBuf;
 
 /// Fits a model to a dense BRDF by Levenberg and Marquardt's method from many random starts, all
 /// channels at once, and prints its numbers with their standard uncertainties (from how much the
@@ -59,14 +53,6 @@ enum LossArgument {
     Cosine,
 }
 
-/// A fit with its table and how far that is from what it was fitted to.
-pub struct FitResult {
-    /// The numbers, with their error.
-    pub note: FitNote,
-    /// The model on the grid.
-    pub dense: DenseBrdf,
-}
-
 impl Fit {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
@@ -93,27 +79,18 @@ impl Fit {
                 );
             }
         }
-        if let Some(folder) = self.output.as_deref().and_then(Path::parent)
-            && !folder.as_os_str().is_empty()
-        {
-            check_writable(folder)?;
+        if let Some(output) = &self.output {
+            check_writable_beside(output)?;
         }
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         let measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
         let name = self.dense.display().to_string();
         let cells = match &self.samples {
-            None => fit::draw(&measured.brdf, settings.cells, settings.seed),
+            None => cells_of_dense(&measured.brdf, &settings),
             Some(path) => {
                 let samples = progress.stage("reading samples", |_| read_samples(path))?;
-                let bins = Bins::new(measured.brdf.grid(), &samples);
-                let cells = fit::draw_measured(&bins, settings.cells, settings.seed);
-                if cells.is_empty() {
-                    bail!(
-                        "{}: no sample lies on the grid; give those of {name}",
-                        path.display()
-                    );
-                }
-                cells
+                cells_of_samples(&measured.brdf, &samples, &settings)
+                    .with_context(|| path.display().to_string())?
             }
         };
         let result = fit_model(
@@ -122,8 +99,9 @@ impl Fit {
             &cells,
             self.model,
             &settings,
-            &mut progress,
-        )?;
+            &progress.watch(),
+        )
+        .with_context(|| name.clone())?;
         print_note(&result.note);
         let converged = result.note.converged;
         if let Some(path) = &self.output {
@@ -144,85 +122,6 @@ impl Fit {
         }
         Ok(())
     }
-}
-
-/// Fits a family to cells of a table, or to the bins behind it, and compares it with the table.
-pub fn fit_model(
-    measured: &DenseFile,
-    name: &str,
-    cells: &[Cell],
-    family: Family,
-    settings: &Settings,
-    progress: &mut Progress,
-) -> Result<FitResult> {
-    let family = family.for_values(measured.scale == Scale::Relative);
-    let start = Instant::now();
-    let fit = progress
-        .stage(&format!("fitting {family}"), |tell| {
-            fit::fit(cells, family, settings, tell)
-        })
-        .with_context(|| name.to_owned())?;
-    let seconds = start.elapsed().as_secs_f64();
-    let model = fit.model().context("the model has no numbers")?;
-    let dense = progress.stage(&format!("tabulating {family}"), |_| {
-        anyhow::Ok(DenseBrdf::tabulate(measured.brdf.grid(), model.as_ref()))
-    })?;
-    let figures = progress.stage(&format!("judging {family}"), |_| {
-        judge(&dense, &family.to_string(), measured, name)
-    })?;
-    let note = FitNote::new(&fit, seconds, figures);
-    Ok(FitResult { note, dense })
-}
-
-/// How far a table is from a measured one, as it is: the fit was made in the measured one's scale.
-fn judge(
-    dense: &DenseBrdf,
-    name: &str,
-    measured: &DenseFile,
-    measured_name: &str,
-) -> Result<Figures> {
-    let absolute = |brdf| Table {
-        brdf,
-        scale: Scale::Absolute,
-    };
-    let options = Options {
-        name_a: name,
-        name_b: measured_name,
-        ..Options::default()
-    };
-    let other = Side::Table(absolute(&measured.brdf));
-    Ok(evaluate::compare(absolute(dense), other, &options)?)
-}
-
-/// Writes the table, and the note beside it.
-pub fn write_fit(path: &Path, result: FitResult, scale: Scale) -> Result<()> {
-    let note = &result.note;
-    let mut provenance = of_this_program();
-    let state = if note.converged {
-        String::new()
-    } else {
-        ", NOT CONVERGED: the best so far".to_owned()
-    };
-    provenance.insert(
-        "fit".into(),
-        format!("{} fitted to {}{state}", note.model, note.figures.b),
-    );
-    let numbers: Vec<String> = note
-        .parameters
-        .iter()
-        .map(|p| format!("{} {}", p.name, significant(p.value)))
-        .collect();
-    provenance.insert("fit_parameters".into(), numbers.join(", "));
-    note.write(&FitNote::path_beside(path))?;
-    write_dense(
-        path,
-        DenseFile {
-            brdf: result.dense,
-            scale,
-            provenance,
-        },
-    )?;
-    Ok(())
 }
 
 fn print_note(note: &FitNote) {
@@ -262,13 +161,7 @@ fn value_text(p: &FittedNumber) -> String {
         format!(" {}", p.unit)
     };
     let bound = if p.at_bound { ", at its bound" } else { "" };
-    format!("{}{unit} {uncertainty}{bound}", significant(p.value))
-}
-
-/// Five significant digits.
-fn significant(value: f64) -> String {
-    let digits = 4 - value.abs().max(1e-9).log10().floor() as i32;
-    format!("{value:.*}", digits.clamp(0, 8) as usize)
+    format!("{}{unit} {uncertainty}{bound}", five_digits(p.value))
 }
 
 #[cfg(test)]
@@ -276,14 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_five_digits_and_their_uncertainty() {
-        for (value, text) in [
-            (0.140_004_9, "0.14000"),
-            (113.0109, "113.01"),
-            (0.0, "0.00000000"),
-        ] {
-            assert_eq!(significant(value), text);
-        }
+    fn numbers_have_their_uncertainty() {
         let mut p = FittedNumber {
             name: "tilt1".into(),
             value: 25.0,

@@ -1,7 +1,7 @@
 //! `gonia import`: other people's measurements.
 
 use crate::progress::Progress;
-use crate::provenance::of_this_program;
+
 use crate::table::count;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
@@ -59,11 +59,11 @@ impl Import {
                 self.material.display()
             ),
         };
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         let brdf = progress.stage("bringing it onto the grid", |_| {
             anyhow::Ok(DenseBrdf::tabulate(grid, model.as_ref()))
         })?;
-        let mut provenance = of_this_program();
+        let mut provenance = gonia_pipeline::provenance::of_this_program();
         provenance.insert(
             "imported".into(),
             format!("{} ({format})", self.material.display()),
@@ -80,7 +80,7 @@ impl Import {
     }
     fn import_samples(&self) -> Result<()> {
         check_sample_name(&self.output)?;
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         let samples = progress.stage("reading the bins", |_| read_ngan(&self.material))?;
         write_samples(&self.output, &samples)?;
         println!(

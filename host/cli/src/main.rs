@@ -1,6 +1,8 @@
 //! The command `gonia`. Each command is one file; all end with exit code 0, with 1 after one line
 //! that says what is wrong and what to do, or with 2 for wrong usage.
 
+mod account;
+mod baselines;
 mod capture;
 mod chart;
 mod chart_motion;
@@ -10,13 +12,11 @@ mod device;
 mod fill;
 mod fit;
 mod import;
-mod method;
 mod photo;
 mod plan;
 mod plan_adaptive;
 mod process;
 mod progress;
-mod provenance;
 mod query;
 mod rectify;
 mod render;

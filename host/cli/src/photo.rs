@@ -1,13 +1,12 @@
 //! `gonia photo`: a photograph of the material beside its render.
 
-use crate::fill::folder_of;
 use crate::progress::Progress;
 use crate::table;
 
 use anyhow::{Result, bail};
 use gonia_formats::dense_exr::read_dense;
 use gonia_formats::photo::read_photo;
-use gonia_formats::{check_writable, write_whole_bytes};
+use gonia_formats::{check_writable_beside, write_whole_bytes};
 use gonia_render as render;
 use gonia_render::color::{delta_e, luminance};
 use gonia_render::{Picture, Tabulated, png, tone};
@@ -94,8 +93,8 @@ impl Photo {
         {
             bail!("--light-up must lie in -89..=89 degrees, --light-right in -180..=180");
         }
-        check_writable(folder_of(&self.output))?;
-        let mut progress = Progress::new();
+        check_writable_beside(&self.output)?;
+        let progress = Progress::new();
         let photo = read_photo(&self.photo)?;
         let outline = self.outline.unwrap_or(Outline {
             left: 0,

@@ -3,10 +3,8 @@
 use crate::plan_adaptive::{expectation, propose};
 use crate::table;
 use anyhow::{Result, bail};
-use gonia_acquire::capture::keep_out::{Pair, apart_deg, way};
-use gonia_acquire::capture::{SETTLE_TIME_S, move_time_s, nearest_turn_deg};
-use gonia_brdf::{Direction, Pose};
-use gonia_formats::check_writable;
+use gonia_acquire::capture::{SETTLE_TIME_S, keep_apart, travelling, travelling_order};
+use gonia_formats::check_writable_beside;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_imaging::SamplingGrid;
@@ -71,7 +69,7 @@ impl Plan {
             bail!("--add {}: must lie in 1..={ADD_MAX} poses", self.add);
         }
         if let Some(path) = &self.output {
-            check_writable(super::fill::folder_of(path))?;
+            check_writable_beside(path)?;
         }
         let (mut plan, proposed) = if self.adaptive.is_empty() {
             let mut rings = Rings::paper();
@@ -85,13 +83,29 @@ impl Plan {
             (travelling(&rings), Vec::new())
         } else {
             let proposal = propose(&rig, &self.adaptive, self.add, self.keep_out)?;
-            let plan = plan::order(&proposal.poses, &arm_time_s, &arm_time_s);
+            let plan = travelling_order(&proposal.poses);
             (plan, vec![expectation(proposal.error)])
         };
         let apart = (self.keep_out > 0.0).then(|| keep_apart(&mut plan, self.keep_out));
         let mut rows = estimate(&rig, &plan, self.dwell);
         rows.extend(proposed);
-        rows.extend(apart.unwrap_or_default());
+        if let Some(apart) = apart {
+            rows.extend([
+                (
+                    "left out".into(),
+                    format!(
+                        "{} poses nearer than {} deg, {} without a clear way",
+                        table::count(apart.too_near as u64),
+                        self.keep_out,
+                        table::count(apart.out_of_reach as u64)
+                    ),
+                ),
+                (
+                    "ways round the other arm".into(),
+                    table::count(apart.rounds as u64),
+                ),
+            ]);
+        }
         if let Some(path) = &self.output {
             write_plan_csv(path, &plan.poses)?;
             rows.push(("written".into(), path.display().to_string()));
@@ -99,81 +113,6 @@ impl Plan {
         table::print(&rows);
         Ok(())
     }
-}
-
-/// The plan of some rings in the arms' own travelling times.
-pub fn travelling(rings: &Rings) -> plan::Plan {
-    plan::plan(rings, &arm_time_s, &arm_time_s)
-}
-
-/// Leaves out the poses at which the arms would touch or to which they cannot come, and goes round
-/// where the straight way is not clear; tells how many.
-fn keep_apart(plan: &mut plan::Plan, keep_out_deg: f64) -> Vec<(String, String)> {
-    let axes = |pose: &Pose| [pose.light, pose.view].map(|d| [d.theta_deg(), d.phi_deg()]);
-    let before = plan.poses.len();
-    plan.poses
-        .retain(|pose| apart_deg(&axes(pose)) >= keep_out_deg);
-    let too_near = before - plan.poses.len();
-    let (mut travel_s, mut rounds, mut out_of_reach) = (0.0, 0u64, 0u64);
-    let limit_deg = |key: Key| f64::from(key.default_of(Axis::Phi)) * 1e-6;
-    let limits_deg = [limit_deg(Key::SoftMin), limit_deg(Key::SoftMax)];
-    let mut at: Option<Pair> = None;
-    plan.poses.retain(|pose| {
-        let Some(from) = at else {
-            at = Some(axes(pose));
-            return true;
-        };
-        let mut to = axes(pose);
-        for (to, from) in to.iter_mut().zip(from) {
-            to[1] = nearest_turn_deg(from[1], to[1], limits_deg).unwrap_or(to[1]);
-        }
-        let Some(legs) = way(&from, &to, keep_out_deg) else {
-            out_of_reach += 1;
-            return false;
-        };
-        rounds += u64::from(legs.len() > 1);
-        travel_s += SETTLE_TIME_S * (legs.len() - 1) as f64;
-        travel_s += [from]
-            .iter()
-            .chain(&legs)
-            .zip(&legs)
-            .map(|(a, b)| leg_time_s(a, b))
-            .sum::<f64>();
-        at = Some(to);
-        true
-    });
-    plan.travel_s = travel_s;
-    // They are of all the poses.
-    plan.others = None;
-    let count = |n: u64| table::count(n);
-    vec![
-        (
-            "left out".into(),
-            format!(
-                "{} poses nearer than {keep_out_deg} deg, {} without a clear way",
-                count(too_near as u64),
-                count(out_of_reach)
-            ),
-        ),
-        ("ways round the other arm".into(), count(rounds)),
-    ]
-}
-
-/// The slowest of four axes.
-fn leg_time_s(from: &Pair, to: &Pair) -> f64 {
-    from.iter()
-        .zip(to)
-        .flat_map(|(from, to)| {
-            [(Axis::Theta, 0), (Axis::Phi, 1)].map(|(axis, i)| move_time_s(axis, from[i], to[i]))
-        })
-        .fold(0.0, f64::max)
-}
-
-/// How long an arm takes from one direction to another: its slower axis, φ the shorter way round.
-fn arm_time_s(from: Direction, to: Direction) -> f64 {
-    let turn = (to.phi_deg() - from.phi_deg() + 180.0).rem_euclid(360.0) - 180.0;
-    let theta = move_time_s(Axis::Theta, from.theta_deg(), to.theta_deg());
-    theta.max(move_time_s(Axis::Phi, 0.0, turn))
 }
 
 /// Refuses elevations beyond the controllers' default limits.

@@ -2,14 +2,13 @@
 
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
-use gonia_brdf::interpolate::{Calibration, Known, Settings, fill_with_errors, select};
-use gonia_brdf::{Bins, Grid};
 use gonia_formats::samples::read_samples_of_all;
 use gonia_pipeline::chart::poses_of;
+use gonia_pipeline::{FillOptions, fill};
 use gonia_plan::adaptive;
 use gonia_plan::adaptive::{Proposal, Reach};
 use gonia_protocol::settings::{Axis, Key};
-use gonia_rig::Rig;
+use gonia_rig::{Rig, SampleSet, Scale};
 use std::path::PathBuf;
 
 /// Step of the grid whose error bars decide, degrees: a frame spans several cells.
@@ -27,7 +26,7 @@ const LIGHT_MAX_DEG: f64 = 85.0;
 /// # Errors
 /// Samples that cannot be read, or that do not say their frames, or of too few frames.
 pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> Result<Proposal> {
-    let mut progress = Progress::new();
+    let progress = Progress::new();
     let samples = progress.stage("reading samples", |_| read_samples_of_all(samples))?;
     let measured = poses_of(&samples);
     if measured.is_empty() {
@@ -36,22 +35,17 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
              gonia capture and gonia process write them"
         );
     }
-    let grid = Grid::with_step_deg(STEP_DEG).context("the grid of the error bars")?;
-    let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
-    drop(samples);
-    let known = Known::new(&bins);
-    let settings = progress.stage("choosing settings", |_| {
-        anyhow::Ok(select(&known, Settings::DEFAULT).settings)
-    })?;
-    let calibration = progress
-        .stage("calibrating error bars", |_| {
-            anyhow::Ok(Calibration::new(&known, &settings))
-        })?
-        .context("too few frames to calibrate error bars: measure a coarse plan of rings first")?;
-    let (dense, bars) = progress.stage("interpolating", |tell| {
-        fill_with_errors(&known, &settings, &calibration, tell)
-    })?;
-    let relative = bars.relative(&dense);
+    let set = SampleSet {
+        samples,
+        scale: Scale::Relative,
+    };
+    let options = FillOptions {
+        with_errors: true,
+        ..FillOptions::with_step_deg(STEP_DEG)
+    };
+    let filled = fill(set, &options, &progress.watch())?;
+    let bars = filled.errors.context("the fill gave no error bars")?;
+    let (grid, relative) = (filled.dense.brdf.grid(), bars.relative(&filled.dense.brdf));
     let highest = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;
     let reach = Reach {
         light_m: rig.light.distance_m,

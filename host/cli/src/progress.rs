@@ -1,47 +1,111 @@
-//! Says which stage a command is in, and how long it still takes.
+//! Says which step a command is in, and how long it still takes.
 
 use gonia_formats::summary::Stage;
+use gonia_pipeline::Step;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Steps of a stage's bar.
 const STEPS: f64 = 1000.0;
 
-/// Stages done so far, with their times.
+/// Stages done so far, with their times: a bar on a terminal, plain lines elsewhere; always on
+/// standard error.
 pub struct Progress {
     terminal: bool,
-    stages: Vec<Stage>,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    /// The stage under way.
+    current: Option<(Instant, ProgressBar)>,
+    done: Vec<Stage>,
 }
 
 impl Progress {
-    /// A bar on a terminal, plain lines elsewhere; always on standard error.
+    /// No stage yet.
     pub fn new() -> Self {
         Self {
             terminal: std::io::stderr().is_terminal(),
-            stages: Vec::new(),
+            state: Mutex::default(),
         }
     }
 
-    /// Runs a stage. The work is given a function to call with the share done, 0 ..= 1.
+    /// Runs a stage of the command's own. The work is given a function to call with the share done,
+    /// 0 ..= 1.
     pub fn stage<T, E>(
-        &mut self,
+        &self,
         name: &str,
         work: impl FnOnce(&(dyn Fn(f64) + Sync)) -> Result<T, E>,
     ) -> Result<T, E> {
-        let start = Instant::now();
+        self.begin(name);
+        let result = work(&|share| self.show(share));
+        self.end(name, result.is_ok());
+        result
+    }
+
+    /// The callback for a function of the library: each of its steps is a stage.
+    pub fn watch(&self) -> impl Fn(Step, f64) -> ControlFlow<()> + Sync {
+        self.watch_named(|step| step.to_string())
+    }
+
+    /// As [`Progress::watch`], with a name for each step.
+    pub fn watch_named(
+        &self,
+        name: impl Fn(Step) -> String + Sync,
+    ) -> impl Fn(Step, f64) -> ControlFlow<()> + Sync {
+        move |step, share| {
+            if share == 0.0 {
+                self.begin(&name(step));
+            } else if share == 1.0 {
+                self.end(&name(step), true);
+            } else {
+                self.show(share);
+            }
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// The stages that ended well so far, in their order.
+    pub fn stages(&self) -> Vec<Stage> {
+        self.state().done.clone()
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A stage list is whole at any time, whoever panicked while it was locked.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn begin(&self, name: &str) {
         let bar = self.bar(name);
-        let result = work(&|share| bar.set_position((share.clamp(0.0, 1.0) * STEPS) as u64));
+        let before = self.state().current.replace((Instant::now(), bar));
+        if let Some((_, bar)) = before {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn show(&self, share: f64) {
+        if let Some((_, bar)) = &self.state().current {
+            bar.set_position((share.clamp(0.0, 1.0) * STEPS) as u64);
+        }
+    }
+
+    fn end(&self, name: &str, well: bool) {
+        let Some((start, bar)) = self.state().current.take() else {
+            return;
+        };
         bar.finish_and_clear();
-        let seconds = start.elapsed().as_secs_f64();
-        if result.is_ok() {
+        if well {
+            let seconds = start.elapsed().as_secs_f64();
             eprintln!("{name:<28} {seconds:>8.1} s");
-            self.stages.push(Stage {
+            self.state().done.push(Stage {
                 name: name.to_owned(),
                 seconds,
             });
         }
-        result
     }
 
     fn bar(&self, name: &str) -> ProgressBar {
@@ -59,9 +123,13 @@ impl Progress {
         bar.enable_steady_tick(Duration::from_millis(250));
         bar
     }
+}
 
-    /// The stages that ended well so far, in their order.
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
+impl Drop for Progress {
+    /// A step of the library that failed leaves its bar.
+    fn drop(&mut self) {
+        if let Some((_, bar)) = &self.state().current {
+            bar.finish_and_clear();
+        }
     }
 }

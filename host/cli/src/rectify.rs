@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use gonia_formats::frame_exr::{Precision, write_frame_as};
-use gonia_formats::{CaptureFolder, FileError, check_writable, write_whole_bytes};
+use gonia_formats::{CaptureFolder, FileError, check_writable_beside, write_whole_bytes};
 use gonia_imaging::hdr::Radiance;
 use gonia_imaging::rectify::{View, rectify, rectify_variance};
 use gonia_imaging::{Registrar, Registration, State};
@@ -62,7 +62,7 @@ impl Rectify {
         if !is_exr && !has_extension(&self.output, "png") {
             bail!("{}: end the name in .exr or .png", self.output.display());
         }
-        check_writable(super::fill::folder_of(&self.output))?;
+        check_writable_beside(&self.output)?;
         let radiance = self.load(&folder)?;
         let Radiance {
             mut frame,

@@ -1,13 +1,12 @@
 //! `gonia render`: what a material looks like.
 
-use crate::fill::folder_of;
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Brdf;
 use gonia_formats::dense_exr::read_dense;
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::photo::read_photo;
-use gonia_formats::{check_writable, write_whole_bytes};
+use gonia_formats::{check_writable_beside, write_whole_bytes};
 use gonia_render as render;
 use gonia_render::{Environment, Light, Picture, Tabulated, png, tone};
 use gonia_rig::Frame;
@@ -71,10 +70,10 @@ impl Render {
             .into_iter()
             .flatten()
         {
-            check_writable(folder_of(path))?;
+            check_writable_beside(path)?;
         }
         let lights = lights_of(&self.light, self.lights)?;
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         let file = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
         let brdf = Tabulated::new(&file.brdf);
         let draw: fn(&dyn Brdf, &[Light], usize, usize) -> Picture = match self.shape {

@@ -1,9 +1,11 @@
 //! `gonia report`: pictures and figures of a measurement, drawn again from its folder.
 
+use crate::baselines::make_and_print;
 use crate::progress::Progress;
-use crate::rivals::Rivals;
 use anyhow::Result;
+use gonia_brdf::fit::Settings;
 use gonia_formats::check_writable;
+use gonia_pipeline::baselines::BaselineOptions;
 use gonia_report::report_folder;
 use std::path::PathBuf;
 
@@ -28,12 +30,16 @@ pub struct Report {
 impl Report {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let mut progress = Progress::new();
+        let progress = Progress::new();
         if let Some(figures) = &self.figures {
             check_writable(figures)?;
         }
         if self.rivals {
-            Rivals::of(self.folder.clone()).run()?;
+            let options = BaselineOptions {
+                without_paper: false,
+                fits: Settings::default(),
+            };
+            make_and_print(&self.folder, None, &options)?;
         }
         let written = progress.stage("drawing the report", |_| {
             report_folder(&self.folder, self.figures.as_deref())

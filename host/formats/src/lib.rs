@@ -36,4 +36,4 @@ pub mod whole_file;
 pub use capture_folder::CaptureFolder;
 pub use error::FileError;
 pub use summary::Summary;
-pub use whole_file::{check_writable, write_whole, write_whole_bytes};
+pub use whole_file::{check_writable, check_writable_beside, write_whole, write_whole_bytes};

@@ -59,6 +59,14 @@ pub fn check_writable(folder: &Path) -> Result<(), FileError> {
     probe.as_file().sync_all().map_err(failed)
 }
 
+/// Makes sure that a file can be written at `file`: its folder is made and written to.
+///
+/// # Errors
+/// As [`check_writable`].
+pub fn check_writable_beside(file: &Path) -> Result<(), FileError> {
+    check_writable(folder_of(file))
+}
+
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -18,7 +18,7 @@ use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_render as render;
 use gonia_render::{Picture, Tabulated, color};
-use gonia_rig::{Figures, Scale, Stratum, stratum};
+use gonia_rig::{DenseFile, Figures, Scale, Stratum, stratum};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -29,6 +29,15 @@ pub struct Table<'a> {
     pub brdf: &'a DenseBrdf,
     /// Whether they are 1/sr.
     pub scale: Scale,
+}
+
+impl<'a> From<&'a DenseFile> for Table<'a> {
+    fn from(file: &'a DenseFile) -> Self {
+        Self {
+            brdf: &file.brdf,
+            scale: file.scale,
+        }
+    }
 }
 
 /// What a table is judged by.

@@ -1,10 +1,45 @@
-//! Frames → samples → dense BRDF → figures: the public library.
+//! Frames → samples → dense BRDF → figures: the library behind the commands.
+//!
+//! ```no_run
+//! use gonia_brdf::Direction;
+//! use gonia_pipeline::{FillOptions, fill, samples_of_folder, silent};
+//!
+//! let samples = samples_of_folder("capture".as_ref(), &silent)?.into_sample_set();
+//! let filled = fill(samples, &FillOptions::with_step_deg(4.0), &silent)?;
+//! let (light, view) = (Direction::from_deg(30.0, 45.0), Direction::from_deg(60.0, 225.0));
+//! println!("{:?} {}", filled.dense.brdf.lookup(light, view), filled.dense.scale);
+//! # Ok::<(), gonia_pipeline::Error>(())
+//! ```
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`samples_of_folder`], [`samples_of`] | a capture folder, or any [`FrameSource`](process::FrameSource) | samples, and what became of each frame |
+//! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples or bins | a dense BRDF, with standard errors where asked for |
+//! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
+//! | [`compare()`] | two BRDFs | figures of merit by stratum |
+//! | [`baselines`] | a measurement | other ways to the same BRDF, and how far each is |
+//! | [`chart`] | samples | what accuracy costs, method by method |
+//!
+//! Nothing is printed. Every function that takes long hears a [`Progress`] callback, which may end
+//! the work; every error is one line ([`Error`]).
 
 mod accumulate;
+pub mod baselines;
 pub mod bracket;
 pub mod chart;
 pub mod compare;
+mod error;
+mod fill;
+pub mod fit;
 pub mod process;
-pub mod rivals;
+mod progress;
+pub mod provenance;
+mod samples;
 
-pub use compare::{CompareError, Options, Side, compare};
+pub use compare::{CompareError, Options, Side, Table, compare};
+pub use error::Error;
+pub use fill::{
+    FillCounts, FillMethod, FillOptions, Filled, FilledBins, fill, fill_bins, fill_to_file,
+};
+pub use progress::{Cancelled, Progress, Step, silent};
+pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

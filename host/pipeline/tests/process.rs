@@ -7,6 +7,7 @@ use gonia_formats::FileError;
 use gonia_pipeline::process::*;
 use gonia_rig::{Frame, FrameRow, Reference, Rig, Role};
 use gonia_sim::scene::Scene;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -37,7 +38,12 @@ impl Rendered {
     }
 
     fn run(&self) -> Result<Processed, ProcessError> {
-        process(&self.scene.geometry.to_rig(), self, &|_, _, _| ())
+        process(
+            &self.scene.geometry.to_rig(),
+            self,
+            &Masks::default(),
+            &|_, _| ControlFlow::Continue(()),
+        )
     }
 }
 
@@ -47,10 +53,6 @@ impl FrameSource for Rendered {
     }
 
     fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
-        let which = match row.role {
-            Role::Material => Role::Material,
-            Role::Reference => Role::Reference,
-        };
         if row.pose == Pose::from_deg(UNREADABLE) {
             return Err(FileError::new(
                 std::path::Path::new(&row.file),
@@ -74,7 +76,7 @@ impl FrameSource for Rendered {
         at.light.phi += wobble(1);
         at.view.theta += wobble(2);
         at.view.phi += wobble(3);
-        Ok(self.scene.frame(which, at, u64::from(row.frame)))
+        Ok(self.scene.frame(row.role, at, u64::from(row.frame)))
     }
 }
 
@@ -170,7 +172,10 @@ fn a_known_reference_gives_absolute_values_within_the_noise() {
     // A patch of n pixels with 1 % noise has a median good to 1.25 % / √n; two frames √2 of that.
     for (px, limits) in [(400, [0.012; 2]), (1024, [0.005; 2])] {
         let (source, rig) = lambertian(px);
-        let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+        let done = process(&rig, &source, &Masks::default(), &|_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         assert_eq!(done.compensation, Compensation::KnownReference);
         assert_eq!(done.samples.len(), POSES.len() * 1225);
         assert_eq!(done.left_out, LeftOutCounts::default());
@@ -201,7 +206,10 @@ fn without_a_reference_an_ideal_light_is_assumed() {
     source.scene.beam = None;
     for reference in [rig.reference.take(), None] {
         rig.reference = reference;
-        let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+        let done = process(&rig, &source, &Masks::default(), &|_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         assert_eq!(done.compensation, Compensation::GeometricModel);
         for error in errors(&done, source.scene.material.as_ref()) {
             assert!(error.bias.abs() < 0.002, "{}: {}", error.frame, error.bias);
@@ -271,7 +279,10 @@ fn frames_that_cannot_be_used_are_refused_and_counted() {
     let blind = source.rows.len() as u32;
     source.add(Role::Material, BLIND);
     source.add(Role::Reference, BLIND);
-    let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+    let done = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let outcome = |frame: u32| {
         let of = |f: &&FrameReport| f.frame == frame;
         done.frames.iter().find(of).unwrap().outcome
@@ -288,7 +299,10 @@ fn frames_that_cannot_be_used_are_refused_and_counted() {
     source
         .rows
         .retain(|row| row.role == Role::Material || row.frame > blind);
-    let error = process(&rig, &source, &|_, _, _| ()).unwrap_err();
+    let error = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap_err();
     assert!(matches!(
         error,
         ProcessError::ReferenceRefused { refused: 1 }
@@ -299,24 +313,31 @@ fn frames_that_cannot_be_used_are_refused_and_counted() {
 fn a_frame_that_cannot_be_read_or_has_another_size_is_named() {
     let (mut source, mut rig) = lambertian(200);
     rig.camera.width_px = 100;
-    let error = process(&rig, &source, &|_, _, _| ())
-        .unwrap_err()
-        .to_string();
+    let error = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap_err()
+    .to_string();
     assert!(
         error.starts_with("frame 0 (frames/000000.exr) has 200 x 200 pixels"),
         "{error}"
     );
     rig.camera.width_px = 200;
     source.add(Role::Reference, UNREADABLE);
-    let error = process(&rig, &source, &|_, _, _| ())
-        .unwrap_err()
-        .to_string();
+    let error = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap_err()
+    .to_string();
     assert_eq!(
         error,
         "frame 12: frames/000012.exr: the file is truncated; copy it again"
     );
     source.rows.clear();
-    let error = process(&rig, &source, &|_, _, _| ()).unwrap_err();
+    let error = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap_err();
     assert!(matches!(error, ProcessError::NoMaterial { rows: 0 }));
 }
 
@@ -328,12 +349,15 @@ fn samples_do_not_depend_on_the_number_of_threads_and_progress_counts_to_the_end
             .num_threads(threads)
             .build()
             .unwrap();
-        let ends = AtomicUsize::new(0);
-        let progress = |_, done: usize, total: usize| {
-            ends.fetch_add(usize::from(done == total), Ordering::Relaxed);
+        let heard = AtomicUsize::new(0);
+        let progress = |_, _| {
+            heard.fetch_add(1, Ordering::Relaxed);
+            ControlFlow::Continue(())
         };
-        let done = pool.install(|| process(&rig, &source, &progress)).unwrap();
-        assert_eq!(ends.into_inner(), 2);
+        let masks = Masks::default();
+        let done = pool.install(|| process(&rig, &source, &masks, &progress));
+        assert_eq!(heard.into_inner(), source.rows().len());
+        let done = done.unwrap();
         done.samples
     };
     assert_eq!(run(1), run(3));
@@ -351,7 +375,10 @@ fn masks_of_a_references_frames_serve_a_material_without_them() {
     with_reference.add(Role::Material, hidden);
     let mut known = rig.clone();
     known.reference = Some(Reference::Reflectance([0.5; 3]));
-    let first = process(&known, &with_reference, &|_, _, _| ()).unwrap();
+    let first = process(&known, &with_reference, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     assert_eq!(first.masks.len(), 1);
     let occluded = first.left_out.occlusion;
     assert!(occluded > 50, "{occluded}");
@@ -364,10 +391,13 @@ fn masks_of_a_references_frames_serve_a_material_without_them() {
     let mut alone = Rendered::new(scene);
     alone.add(Role::Material, hidden);
     alone.rows[0].frame = 1;
-    let done = process_with_masks(&rig, &alone, &masks, &|_, _, _| ()).unwrap();
+    let done = process(&rig, &alone, &masks, &|_, _| ControlFlow::Continue(())).unwrap();
     let off = done.left_out.occlusion.abs_diff(occluded);
     assert!(off <= 5, "{occluded}, and {}", done.left_out.occlusion);
-    let without = process(&rig, &alone, &|_, _, _| ()).unwrap();
+    let without = process(&rig, &alone, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     assert_eq!(without.left_out.occlusion, 0);
 }
 
@@ -385,7 +415,10 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
         file: "white.csv".into(),
         table: ReflectanceTable::ByIncidence(rows),
     });
-    let done = process(&rig, &source, &|_, _, _| ()).unwrap();
+    let done = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     assert_eq!(done.compensation, Compensation::KnownReference);
     for (theta, factor) in [(30.0f32, 1.0f64), (75.0, 2.0)] {
         let truth = source.scene.material.as_ref();
@@ -406,4 +439,17 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;
         assert!(logs.len() > 100 && mean.abs() < 0.002, "{theta}: {mean}");
     }
+}
+
+#[test]
+fn a_break_ends_the_work() {
+    let source = Rendered::new(Scene::of_fabric(240));
+    let rig = source.scene.geometry.to_rig();
+    let error = process(&rig, &source, &Masks::default(), &|_, _| {
+        ControlFlow::Break(())
+    });
+    assert!(matches!(
+        error,
+        Err(ProcessError::Cancelled(_)) | Err(ProcessError::NoMaterial { .. })
+    ));
 }

@@ -10,6 +10,7 @@ mod fits;
 pub mod folder;
 pub mod frontier;
 mod html;
+mod make_baselines;
 mod panels;
 pub mod rivals;
 mod shots;
@@ -19,6 +20,7 @@ mod subspaces;
 
 pub use figures::write_figures;
 pub use folder::report_folder;
+pub use make_baselines::make_baselines;
 
 use gonia_brdf::{Brdf, DenseBrdf};
 use gonia_formats::fit_toml::FitNote;

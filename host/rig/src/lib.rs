@@ -7,7 +7,7 @@
 //! | [`ArmPorts`], [`Source`], [`SessionSettings`], [`Genicam`] | the bench setup of a session |
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
-//! | [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
+//! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
 
 mod bench_setup;
@@ -22,6 +22,7 @@ mod genicam;
 mod homography;
 mod raw_frame;
 mod rig;
+mod sample_set;
 mod scale;
 pub mod stratum;
 
@@ -37,5 +38,6 @@ pub use genicam::{ExposureTiming, Genicam, PixelFormat};
 pub use homography::Homography;
 pub use raw_frame::RawFrame;
 pub use rig::{Bayer, Camera, Light, Reference, ReflectanceTable, Rig, Sampling, Sensor, Target};
+pub use sample_set::SampleSet;
 pub use scale::Scale;
 pub use stratum::Stratum;

@@ -12,6 +12,7 @@ mod port;
 mod session;
 mod thermometer;
 mod timing;
+mod travel;
 mod unattended;
 mod watch;
 
@@ -23,5 +24,6 @@ pub use pace::Pace;
 pub use port::{Opener, SessionPort};
 pub use session::{SessionError, SessionSummary, Shooter, Shot, ShotOutcome, run_session};
 pub use timing::{POINTING_LIMIT_DEG, SETTLE_TIME_S, move_time_s, nearest_turn_deg};
+pub use travel::{KeptApart, keep_apart, travelling, travelling_order};
 pub use unattended::{Capture, Ended};
 pub use watch::{Told, Watch, Watchers};

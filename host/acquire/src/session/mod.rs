@@ -17,6 +17,7 @@ mod folder;
 mod journal;
 mod provenance;
 pub mod record;
+mod samples;
 mod verify;
 mod writer;
 

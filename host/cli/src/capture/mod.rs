@@ -5,10 +5,10 @@ mod map;
 mod terminal;
 
 use crate::progress::Progress;
-use crate::{process, table};
+use crate::{account, table};
 use anyhow::{Context, Result, bail};
 use bench::{Bench, Ports};
-use gonia_acquire::capture::{Capture as Run, Ended, Orders, Watch, Watchers, free_mb};
+use gonia_acquire::capture::{Capture as Run, Ended, Orders, Watch, Watchers, free_mb, travelling};
 use gonia_acquire::session::{
     Beginning, Claim, ControllerIdentity, End, Entry, Provenance, RIG, SessionFolder, SessionWriter,
 };
@@ -19,6 +19,7 @@ use gonia_formats::rig_toml::read_rig;
 use gonia_formats::samples::write_samples;
 use gonia_formats::{FileError, check_writable};
 use gonia_live::{Listening, LivePage};
+use gonia_pipeline::process::MASKS;
 use gonia_plan::Rings;
 use gonia_rig::{Reference, Rig};
 use std::net::SocketAddr;
@@ -116,7 +117,7 @@ impl Capture {
         }
         bench.check_reach(&plan)?;
         let provenance = Provenance {
-            program: super::provenance::program(),
+            program: gonia_pipeline::provenance::program(),
             began: String::new(),
             rig_crc: String::new(),
             plan_crc: String::new(),
@@ -176,7 +177,7 @@ impl Capture {
     fn fresh_plan(&self) -> Result<Vec<Pose>> {
         let plan = match &self.plan {
             Some(path) => read_plan_csv(path)?,
-            None => super::plan::travelling(&Rings::paper()).poses,
+            None => travelling(&Rings::paper()).poses,
         };
         if plan.is_empty() {
             bail!("the plan has no pose: make one with gonia plan");
@@ -199,15 +200,16 @@ impl Capture {
                 ended.reason
             );
         }
-        let mut progress = Progress::new();
-        let processed = process::run_on_session(&session, &mut progress)
+        let progress = Progress::new();
+        let processed = session
+            .samples(&progress.watch())
             .context("the session is complete, but gives no samples yet")?;
         write_samples(&self.folder.join("samples.npy"), &processed.samples)?;
         if !processed.masks.is_empty() {
-            let path = self.folder.join(process::MASKS);
+            let path = self.folder.join(MASKS);
             processed.masks.write(&path, session.rig())?;
         }
-        table::print(&process::describe(&processed));
+        table::print(&account::describe(&processed));
         Ok(())
     }
 }

@@ -4,12 +4,11 @@
 mod session;
 mod summary;
 
-use crate::fill::{How, PresetArgument, fill};
-use crate::plan::travelling;
+use crate::account;
 use crate::progress::Progress;
-use crate::{fill, process};
 use anyhow::{Context, Result, bail};
 use gonia_acquire::camera::SimulatedCamera;
+use gonia_acquire::capture::travelling;
 use gonia_brdf::DenseBrdf;
 use gonia_brdf::model::{Kurt, Material};
 use gonia_formats::dense_exr::write_dense;
@@ -18,10 +17,9 @@ use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::write_rig;
 use gonia_formats::samples::write_samples;
 use gonia_formats::{cell_mask, check_writable};
-use gonia_pipeline as evaluate;
-use gonia_pipeline::compare::Table;
-use gonia_pipeline::process::FrameSource;
-use gonia_pipeline::{Options, Side};
+use gonia_pipeline::process::{FrameSource, Masks};
+use gonia_pipeline::provenance::of_this_program;
+use gonia_pipeline::{FillOptions, Options, Side, Table, compare, fill, samples_of};
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
 use gonia_report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
@@ -73,17 +71,11 @@ impl Demo {
             bail!("--frame-px {frame_px}: must lie in 100..=8192");
         }
         let keep_frames = self.keep_frames || self.quick;
-        let (grid, settings) = How {
-            step,
-            preset: PresetArgument::Default,
-            block: None,
-            nodes: None,
-            tolerance: None,
-        }
-        .check()?;
+        let options = FillOptions::with_step_deg(step);
+        let (grid, _) = options.check()?;
         check_writable(&self.out)?;
         let path = |name: &str| self.out.join(name);
-        let mut progress = Progress::new();
+        let progress = Progress::new();
 
         let rig = Rig::paper(frame_px);
         write_rig(&path("rig.toml"), &rig)?;
@@ -108,16 +100,14 @@ impl Demo {
             write_frames_csv(&path("frames.csv"), camera.rows())?;
         }
 
-        let processed = process::run(&rig, &camera, &mut progress)?;
+        let processed = samples_of(&rig, &camera, &Masks::default(), &progress.watch())?;
         progress.stage("writing samples", |_| {
             write_samples(&path("samples.npy"), &processed.samples)
         })?;
-        let frame_rows = process::describe(&processed);
+        let frame_rows = account::describe(&processed);
         let mut summary = summary::start(material.what, &session, &processed, plan.poses.len());
-        let filled = fill(processed.samples, grid, settings, false, &mut progress)?;
-        summary
-            .provenance
-            .extend(fill::provenance_of(&filled.settings));
+        let filled = fill(processed.into_sample_set(), &options, &progress.watch())?;
+        summary.provenance.extend(filled.dense.provenance);
         for (name, text) in [
             ("material", material.name.to_owned()),
             ("seed", self.seed.to_string()),
@@ -129,23 +119,20 @@ impl Demo {
 
         let measured = CellMask::from_cells(grid, filled.cells.iter().map(|c| *c as usize));
         cell_mask::write_mask(&path(MEASURED), &measured)?;
-        summary::count_cells(&mut summary, filled.binned as u64, &measured);
+        summary::count_cells(&mut summary, filled.counts.binned as u64, &measured);
         let dense = progress.stage("writing the dense BRDF", |_| {
             write_dense(
                 &path(DENSE),
                 DenseFile {
-                    brdf: filled.dense,
+                    brdf: filled.dense.brdf,
                     scale: summary.scale,
                     provenance: summary.provenance.clone(),
                 },
             )
         })?;
         summary.figures = Some(progress.stage("measuring the error", |_| {
-            evaluate::compare(
-                Table {
-                    brdf: &dense.brdf,
-                    scale: dense.scale,
-                },
+            compare(
+                Table::from(&dense),
                 Side::Model(truth.as_ref()),
                 &Options::default(),
             )
@@ -156,7 +143,7 @@ impl Demo {
                 DenseFile {
                     brdf: DenseBrdf::tabulate(grid, truth.as_ref()),
                     scale: Scale::Absolute,
-                    provenance: super::provenance::of_this_program(),
+                    provenance: of_this_program(),
                 },
             )
         })?;

@@ -1,7 +1,7 @@
 //! What the demo did, in figures: for `summary.toml`, and as a table on the terminal.
 
 use crate::demo::session::Session;
-use crate::{process, table};
+use crate::table;
 use gonia_brdf::Grid;
 use gonia_formats::Summary;
 use gonia_formats::summary::{BinCounts, CellCounts, FileNote, PoseCounts};
@@ -31,13 +31,13 @@ const FILES: [(&str, &str); 10] = [
 pub fn start(material: &str, session: &Session, processed: &Processed, poses: usize) -> Summary {
     let mut summary = Summary::new(
         format!("{} on the simulated rig", capitalised(material)),
-        process::scale_of(processed),
+        processed.scale(),
     );
     summary.poses = Some(PoseCounts {
         planned: poses as u64,
         reached: session.kept as u64,
     });
-    let mut frames = process::frame_counts(processed);
+    let mut frames = processed.frame_counts();
     frames.refused.extend(session.refusals());
     summary.frames = Some(frames);
     summary.pointing = session.pointing();

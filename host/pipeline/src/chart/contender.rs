@@ -1,10 +1,13 @@
 //! The methods that are compared.
 
+use crate::Error;
 use crate::chart::cpu::cpu_seconds;
+use crate::fill::fill_bins;
+use crate::progress::silent;
 use gonia_brdf::cellwise::{
     CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
 };
-use gonia_brdf::interpolate::{self, FillError, Known, Preset, Settings};
+use gonia_brdf::interpolate::{Preset, Settings};
 use gonia_brdf::{Bins, Grid};
 use rayon::prelude::*;
 use std::fmt;
@@ -166,7 +169,7 @@ impl Contender {
     }
 
     /// Gives cells (a pair of direction indices each, poles at azimuth 0) their values.
-    pub(super) fn run(&self, bins: &Bins, cells: &[(u32, u32)]) -> Result<Run, FillError> {
+    pub(super) fn run(&self, bins: &Bins, cells: &[(u32, u32)]) -> Result<Run, Error> {
         match self {
             Contender::Cellwise(settings) => run_cellwise(bins, settings, cells),
             Contender::Blocks(settings) => run_blocks(bins, settings, cells),
@@ -174,11 +177,7 @@ impl Contender {
     }
 }
 
-fn run_cellwise(
-    bins: &Bins,
-    settings: &CellSettings,
-    cells: &[(u32, u32)],
-) -> Result<Run, FillError> {
+fn run_cellwise(bins: &Bins, settings: &CellSettings, cells: &[(u32, u32)]) -> Result<Run, Error> {
     let start = cpu_seconds();
     let filler = CellFiller::new(bins, settings)?;
     let built = cpu_seconds();
@@ -202,11 +201,9 @@ fn run_cellwise(
     })
 }
 
-fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
+fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, Error> {
     let start = cpu_seconds();
-    let known = Known::thinned(bins, base.one_bin_in);
-    let settings = interpolate::select(&known, *base).settings;
-    let dense = interpolate::fill(&known, &settings, &|_| ())?;
+    let dense = fill_bins(bins, *base, false, &silent)?.dense;
     let core_s = cpu_seconds() - start;
     let at = |(light, view): &(u32, u32)| dense.at(*light as usize, *view as usize);
     Ok(Run {

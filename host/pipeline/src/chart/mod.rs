@@ -15,8 +15,8 @@ pub use frames::{ChartError, HeldOut, Subset, poses_of};
 pub use judge::{Judge, TestCounts};
 pub use table::{front, to_csv};
 
+use crate::Error;
 use gonia_brdf::Bins;
-use gonia_brdf::interpolate::FillError;
 use gonia_rig::StratumFigures;
 
 /// A method's place on the chart.
@@ -54,7 +54,7 @@ pub fn methods(
     contenders: &[Contender],
     judge: &Judge,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Vec<Point>, FillError> {
+) -> Result<Vec<Point>, Error> {
     let mut points = Vec::with_capacity(contenders.len());
     for (k, contender) in contenders.iter().enumerate() {
         points.push(measure(bins, frames, contender, judge)?);
@@ -72,7 +72,7 @@ pub fn images(
     contenders: &[Contender],
     judge: &Judge,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Vec<Point>, FillError> {
+) -> Result<Vec<Point>, Error> {
     let mut points = Vec::new();
     for (k, subset) in subsets.iter().enumerate() {
         let bins = Bins::new(judge.grid(), &subset.samples());
@@ -91,7 +91,7 @@ fn measure(
     frames: usize,
     contender: &Contender,
     judge: &Judge,
-) -> Result<Point, FillError> {
+) -> Result<Point, Error> {
     let run = contender.run(bins, judge.cells())?;
     let (strata, sphere_delta_e) = judge.figures(&run.values);
     Ok(Point {

@@ -9,6 +9,9 @@ use gonia_imaging::Mask;
 use gonia_rig::Rig;
 use std::path::Path;
 
+/// Name of the file beside the samples that says what hid the target in the reference's frames.
+pub const MASKS: &str = "masks.csv";
+
 /// Masks by the arms' reading; no mask at a pose at which nothing hid the target.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Masks {

@@ -15,10 +15,11 @@ pub mod source;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
 pub use compensation::Compensation;
-pub use masks::Masks;
+pub use masks::{MASKS, Masks};
 pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
 pub use source::{FrameRow, FrameSource, Role};
 
+use crate::progress::Cancelled;
 use compensation::Compensator;
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::{Direction, Sample};
@@ -28,6 +29,7 @@ use gonia_imaging::ideal_light::IdealLight;
 use gonia_rig::{Frame, Rig};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What [`process`] is at.
@@ -117,29 +119,28 @@ pub enum ProcessError {
     /// Eq. (3) needs more of the reference than was measured.
     #[error(transparent)]
     Coverage(#[from] coverage::CoverageError),
+    /// The caller has ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Frames in work at a time; what they leave is gathered in their order.
 const BATCH: usize = 256;
 
-/// Makes samples from frames. The compensation follows from what there is: a reference of known
-/// albedo, an unknown one (eq. (3)), or none. `progress` is told the stage, the frames done and
-/// their number, from any thread.
+/// Makes samples from frames. The calibration follows from what there is: a reference of known
+/// albedo, an unknown one (eq. (3)), or none. `masks` are those of another session's reference, for
+/// poses at which this one has no frame of the reference; where they have none either, the
+/// material's own frame tells what hid it. `progress` hears the stage and the frames done in it, from
+/// any thread, and ends the work by a break.
+///
+/// # Errors
+/// No frame of the material, a frame that cannot be read or is of another size, no good frame of the
+/// reference, or too few of an unknown one.
 pub fn process(
     rig: &Rig,
     source: &dyn FrameSource,
-    progress: &(dyn Fn(Stage, usize, usize) + Sync),
-) -> Result<Processed, ProcessError> {
-    process_with_masks(rig, source, &Masks::default(), progress)
-}
-
-/// As [`process`], with the masks of another session's reference for the poses at which this one has
-/// no reference frame; where those have none either, the material's own frame must tell.
-pub fn process_with_masks(
-    rig: &Rig,
-    source: &dyn FrameSource,
     masks: &Masks,
-    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+    progress: Heard<'_>,
 ) -> Result<Processed, ProcessError> {
     let sampler = FrameSampler::new(rig);
     let sampled = |row: &FrameRow, hidden: Hidden| {
@@ -149,16 +150,22 @@ pub fn process_with_masks(
     process_sampled(rig, source.rows(), &sampled, masks, progress)
 }
 
+/// Hears the stage and the frames done in it.
+pub type Heard<'a> = &'a (dyn Fn(Stage, usize) -> ControlFlow<()> + Sync);
+
 /// How a frame is had sampled, from any thread.
 pub type Sampled<'a> = &'a (dyn Fn(&FrameRow, Hidden) -> Result<SampledFrame, ProcessError> + Sync);
 
-/// As [`process_with_masks`], of frames that come sampled: a session's are kept so.
+/// As [`process`], of frames that come sampled: a session's are kept so.
+///
+/// # Errors
+/// As [`process`].
 pub fn process_sampled(
     rig: &Rig,
     rows: &[FrameRow],
     sampled: Sampled,
     masks: &Masks,
-    progress: &(dyn Fn(Stage, usize, usize) + Sync),
+    progress: Heard<'_>,
 ) -> Result<Processed, ProcessError> {
     let of_role = |role| -> Vec<&FrameRow> { rows.iter().filter(|r| r.role == role).collect() };
     let (material, reference) = (of_role(Role::Material), of_role(Role::Reference));
@@ -251,7 +258,7 @@ impl Bench<'_> {
         &self,
         stage: Stage,
         rows: &[&FrameRow],
-        progress: &(dyn Fn(Stage, usize, usize) + Sync),
+        progress: Heard<'_>,
         work: impl Fn(&FrameRow) -> Result<T, ProcessError> + Sync,
         mut gather: impl FnMut(T),
     ) -> Result<(), ProcessError> {
@@ -261,8 +268,11 @@ impl Bench<'_> {
                 .par_iter()
                 .map(|row| {
                     let result = work(row)?;
-                    progress(stage, 1 + done.fetch_add(1, Ordering::Relaxed), rows.len());
-                    Ok(result)
+                    let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+                    match progress(stage, done) {
+                        ControlFlow::Continue(()) => Ok(result),
+                        ControlFlow::Break(()) => Err(Cancelled.into()),
+                    }
                 })
                 .collect::<Vec<Result<T, ProcessError>>>();
             // In order: of several bad frames the first one is named, whichever thread met one first.

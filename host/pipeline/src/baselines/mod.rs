@@ -3,9 +3,11 @@
 
 mod cylinder_strips;
 mod paper;
+mod session;
 
 pub use cylinder_strips::measure_on_strips;
 pub use paper::{check_grid, coarse, fill_check_cells};
+pub use session::{BaselineOptions, Made, Measurement};
 
 use gonia_brdf::{Direction, Sample, Vec3};
 use std::collections::BTreeMap;

@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 /// Name and text of each fact.
 pub type Provenance = BTreeMap<String, String>;
 
-/// The facts that hold for any run of this program.
+/// The facts that hold for any run of this version.
 pub fn of_this_program() -> Provenance {
     Provenance::from([("version".to_owned(), program())])
 }
 
-/// This program with its version, and the state of the sources where `GONIA_GIT` told it at build
-/// time, as the firmware's.
+/// gonia with its version, and the state of the sources where `GONIA_GIT` gave it at build time.
 pub fn program() -> String {
     let version = env!("CARGO_PKG_VERSION");
     match option_env!("GONIA_GIT") {

@@ -1,0 +1,66 @@
+//! What came of the frames: rows of a command's table.
+
+use crate::table;
+use gonia_pipeline::process::{Compensation, Outcome, Processed};
+
+/// What came of the frames, for the table.
+pub fn describe(processed: &Processed) -> Vec<(String, String)> {
+    let counts = processed.frame_counts();
+    let by_pose = processed
+        .frames
+        .iter()
+        .filter(|frame| matches!(frame.outcome, Outcome::FellBack(_)))
+        .count();
+    let offsets = &processed.offsets;
+    let left_out = &processed.left_out;
+    let mut rows = vec![
+        (
+            "frames".to_owned(),
+            format!(
+                "{} kept ({} of them by their pose, marks hidden), {} refused",
+                table::count(counts.kept),
+                table::count(by_pose as u64),
+                table::count(counts.n_refused())
+            ),
+        ),
+        (
+            "camera by the marks".into(),
+            format!(
+                "theta {:+.4} ± {:.4}, phi {:+.4} ± {:.4} degrees from the arm's reading",
+                offsets.theta_mean_deg,
+                offsets.theta_sd_deg,
+                offsets.phi_mean_deg,
+                offsets.phi_sd_deg
+            ),
+        ),
+        (
+            "compensation".into(),
+            match processed.compensation {
+                Compensation::KnownReference => "by the known reference, absolute (1/sr)",
+                Compensation::UnknownReference => "by the unknown reference, eq. (3), relative",
+                Compensation::GeometricModel => "none: ideal light over the geometry, relative",
+            }
+            .to_owned(),
+        ),
+        (
+            "samples".into(),
+            format!(
+                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} saturated, {} not finite)",
+                table::count(processed.samples.len() as u64),
+                table::count(left_out.total()),
+                table::count(left_out.occlusion),
+                table::count(left_out.dark_reference + left_out.below_horizon),
+                table::count(left_out.mark + left_out.border),
+                table::count(left_out.saturated),
+                table::count(left_out.not_finite)
+            ),
+        ),
+    ];
+    for refused in counts.refused {
+        rows.push((
+            format!("refused, {}", table::count(refused.count)),
+            refused.reason,
+        ));
+    }
+    rows
+}

@@ -1,0 +1,78 @@
+//! Why the pipeline ends without a result.
+
+use crate::compare::CompareError;
+use crate::process::ProcessError;
+use crate::progress::Cancelled;
+use gonia_brdf::fit::FitError;
+use gonia_brdf::interpolate::FillError;
+use gonia_formats::FileError;
+
+/// Any error of this library. Each says in one line what is wrong and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file cannot be read or written, or says what cannot be.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Frames cannot become samples.
+    #[error(transparent)]
+    Process(ProcessError),
+    /// The frames gave no sample.
+    #[error("none of the {frames} frames gave a sample: {why}; check rig.toml and the poses")]
+    NoSamples {
+        /// Frames looked at.
+        frames: usize,
+        /// The commonest reason.
+        why: String,
+    },
+    /// An option has a value that is not possible.
+    #[error("{option} {found}: {remedy}")]
+    Option {
+        /// The option, as the command line spells it.
+        option: &'static str,
+        /// The value.
+        found: String,
+        /// What is possible.
+        remedy: String,
+    },
+    /// The samples cannot be interpolated.
+    #[error(transparent)]
+    Fill(#[from] FillError),
+    /// Error bars need more frames.
+    #[error("too few frames to calibrate error bars: measure more poses, or leave --error out")]
+    TooFewFrames,
+    /// A model cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// No sample lies on the grid of what a model is to be fitted to.
+    #[error("no sample lies on the grid; give those of the same measurement")]
+    NoSampleOnGrid,
+    /// Two BRDFs cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// A measurement has too few frames to be compared with its baselines.
+    #[error(
+        "has {frames} frames to take central samples of; give samples with frame numbers (N x 8)"
+    )]
+    TooFewCentres {
+        /// Frames with a number.
+        frames: usize,
+    },
+    /// The caller's progress callback said so.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl From<Cancelled> for Error {
+    fn from(_: Cancelled) -> Self {
+        Error::Cancelled
+    }
+}
+
+impl From<ProcessError> for Error {
+    fn from(error: ProcessError) -> Self {
+        match error {
+            ProcessError::Cancelled(_) => Error::Cancelled,
+            error => Error::Process(error),
+        }
+    }
+}

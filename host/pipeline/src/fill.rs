@@ -1,0 +1,406 @@
+//! Samples → bins → dense BRDF.
+
+use crate::Error;
+use crate::progress::{Progress, Step, step};
+use crate::provenance::{Provenance, of_this_program};
+use gonia_brdf::cellwise::{self, CellSettings, SettingsError};
+use gonia_brdf::interpolate::{self, ByRows, Calibration, ErrorBars, Known, Preset, Settings};
+use gonia_brdf::{Bins, DenseBrdf, Grid};
+use gonia_formats::dense_exr::write_dense_by_rows;
+use gonia_rig::{DenseFile, SampleSet};
+use std::path::Path;
+use std::str::FromStr;
+
+/// How to fill a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FillOptions {
+    /// Step of the grid in θ and in φ, degrees.
+    pub step_deg: f64,
+    /// Speed against accuracy.
+    pub preset: Preset,
+    /// By which method.
+    pub method: FillMethod,
+    /// Side of the blocks that share a factorisation, degrees; the preset's without it.
+    pub block_deg: Option<f64>,
+    /// Data in a block's neighbourhood, 8 ..= 1024; the preset's without it.
+    pub nodes: Option<usize>,
+    /// A block is refined where a finer one differs from it by more than this many times the noise
+    /// of the samples, 0 ..= ∞; the preset's without it, or more where refining would cost too much.
+    pub tolerance: Option<f32>,
+    /// Whether each cell gets a standard error.
+    pub with_errors: bool,
+}
+
+impl Default for FillOptions {
+    /// The paper's grid of 2°, the default preset, no standard errors.
+    fn default() -> Self {
+        Self {
+            step_deg: 2.0,
+            preset: Preset::Default,
+            method: FillMethod::Blocks,
+            block_deg: None,
+            nodes: None,
+            tolerance: None,
+            with_errors: false,
+        }
+    }
+}
+
+/// By which method a grid is filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FillMethod {
+    /// Blocks that share a kriging system, with the settings that suit the material.
+    Blocks,
+    /// One cell at a time: the paper's method and other baselines.
+    Cellwise(CellSettings),
+}
+
+impl FromStr for FillMethod {
+    type Err = SettingsError;
+
+    /// `default`, `paper`, or another baseline by name.
+    fn from_str(text: &str) -> Result<Self, SettingsError> {
+        if text == "default" {
+            return Ok(FillMethod::Blocks);
+        }
+        text.parse().map(FillMethod::Cellwise)
+    }
+}
+
+/// A grid of more cells than this (12 bytes each) is filled row by row, in twice the time.
+const CELLS_IN_MEMORY: usize = 150_000_000;
+
+impl FillOptions {
+    /// The default with another step.
+    pub fn with_step_deg(step_deg: f64) -> Self {
+        Self {
+            step_deg,
+            ..Self::default()
+        }
+    }
+
+    /// The grid, and the settings before the material's own are chosen.
+    ///
+    /// # Errors
+    /// A value that is not possible, or two that do not go together.
+    pub fn check(&self) -> Result<(Grid, Settings), Error> {
+        let refuse = |option, found: String, remedy: String| {
+            Err(Error::Option {
+                option,
+                found,
+                remedy,
+            })
+        };
+        let grid = Grid::with_step_deg(self.step_deg).map_err(|error| Error::Option {
+            option: "--step",
+            found: self.step_deg.to_string(),
+            remedy: error.to_string(),
+        })?;
+        let preset = self.preset.settings();
+        let settings = Settings {
+            // Blocks of few cells share too little.
+            block_deg: self
+                .block_deg
+                .unwrap_or(preset.block_deg.max(2.0 * self.step_deg)),
+            nodes: self.nodes.unwrap_or(preset.nodes),
+            tolerance: self.tolerance.unwrap_or(preset.tolerance),
+            // Who asks for a tolerance gets it.
+            budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
+            ..preset
+        };
+        // A coarse grid has coarse blocks; only a size that was asked for can be too large.
+        let most_deg = if self.block_deg.is_some() {
+            45.0
+        } else {
+            f64::INFINITY
+        };
+        if !(self.step_deg..=most_deg).contains(&settings.block_deg) {
+            return refuse(
+                "--block",
+                settings.block_deg.to_string(),
+                format!(
+                    "must lie between the step ({}) and 45 degrees",
+                    self.step_deg
+                ),
+            );
+        }
+        if !(8..=1024).contains(&settings.nodes) {
+            return refuse(
+                "--nodes",
+                settings.nodes.to_string(),
+                "must lie in 8..=1024".into(),
+            );
+        }
+        if settings.tolerance.is_nan() || settings.tolerance < 0.0 {
+            return refuse(
+                "--tolerance",
+                settings.tolerance.to_string(),
+                "must be 0 or more, or inf".into(),
+            );
+        }
+        let by_rows = format!(
+            "not on a grid of {} degrees, which is filled row by row; leave it out",
+            self.step_deg
+        );
+        let is_blocks = self.method == FillMethod::Blocks;
+        if self.with_errors && !is_blocks {
+            return refuse(
+                "--error",
+                "with --method".into(),
+                "only the default method has error bars; leave out one of them".into(),
+            );
+        }
+        if grid.n_cells() > CELLS_IN_MEMORY && self.with_errors {
+            return refuse("--error", self.step_deg.to_string(), by_rows);
+        }
+        if grid.n_cells() > CELLS_IN_MEMORY && !is_blocks {
+            return refuse("--method", self.step_deg.to_string(), by_rows);
+        }
+        Ok((grid, settings))
+    }
+
+    /// Whether the grid fits memory: [`fill`] makes it then, and [`fill_to_file`] otherwise.
+    ///
+    /// # Errors
+    /// As [`FillOptions::check`].
+    pub fn fits_memory(&self) -> Result<bool, Error> {
+        Ok(self.check()?.0.n_cells() <= CELLS_IN_MEMORY)
+    }
+}
+
+/// What became of the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FillCounts {
+    /// Samples that fell into a bin.
+    pub binned: usize,
+    /// Samples outside the grid.
+    pub outside: usize,
+    /// Bins that hold a sample.
+    pub bins: usize,
+    /// Interpolations that failed and got the nearest value; baselines only.
+    pub failed: u64,
+    /// Values that were not positive and were raised; baselines only.
+    pub raised: u64,
+}
+
+/// A dense BRDF, and how it came about.
+#[derive(Clone, Debug)]
+pub struct Filled {
+    /// The values with their scale and provenance.
+    pub dense: DenseFile,
+    /// Standard errors, where asked for.
+    pub errors: Option<ErrorBars>,
+    /// Cells with a sample, by number ([`Grid::cell`]).
+    pub cells: Vec<u32>,
+    /// What became of the samples.
+    pub counts: FillCounts,
+    /// The method's settings, as chosen for the material, for people.
+    pub settings: String,
+}
+
+/// Bins samples, chooses the settings that suit the material, and interpolates every cell of the
+/// grid. The result has the samples' scale. The grid must fit memory.
+///
+/// # Errors
+/// Options that are not possible, too few bins, or too few frames for standard errors.
+pub fn fill(
+    samples: SampleSet,
+    options: &FillOptions,
+    progress: &Progress<'_>,
+) -> Result<Filled, Error> {
+    let (grid, base) = options.check()?;
+    let scale = samples.scale;
+    let binned = Binned::new(samples, grid, progress)?;
+    let (brdf, errors, settings, counts) = match options.method {
+        FillMethod::Blocks => {
+            let blocks = fill_bins(&binned.bins, base, options.with_errors, progress)?;
+            let text = blocks.settings.to_string();
+            (blocks.dense, blocks.errors, text, binned.counts())
+        }
+        FillMethod::Cellwise(settings) => {
+            let filled = step(progress, Step::Interpolating, |share| {
+                cellwise::fill(&binned.bins, &settings, share).map_err(Error::from)
+            })?;
+            let counts = FillCounts {
+                failed: filled.failed,
+                raised: filled.raised,
+                ..binned.counts()
+            };
+            (filled.dense, None, settings.to_string(), counts)
+        }
+    };
+    Ok(Filled {
+        dense: DenseFile {
+            brdf,
+            scale,
+            provenance: provenance_of(&settings),
+        },
+        errors,
+        cells: binned.bins.bins().iter().map(|b| b.cell).collect(),
+        counts,
+        settings,
+    })
+}
+
+/// Fills a grid that does not fit memory, and writes it row by row. `facts` are added to the file's
+/// provenance. Gives what became of the samples, and the settings.
+///
+/// # Errors
+/// As [`fill`], and when the file cannot be written.
+pub fn fill_to_file(
+    samples: SampleSet,
+    options: &FillOptions,
+    path: &Path,
+    facts: &Provenance,
+    progress: &Progress<'_>,
+) -> Result<(FillCounts, String), Error> {
+    let (grid, base) = options.check()?;
+    let scale = samples.scale;
+    let binned = Binned::new(samples, grid, progress)?;
+    let known = sorted(&binned.bins, base, progress)?;
+    let settings = chosen(&known, base, progress)?;
+    let rows = step(progress, Step::FittingBlocks, |share| {
+        ByRows::new(&known, &settings, share).map_err(Error::from)
+    })?;
+    let mut provenance = provenance_of(&settings.to_string());
+    provenance.extend(facts.clone());
+    step(progress, Step::InterpolatingAndWriting, |share| {
+        write_dense_by_rows(path, grid, &rows, scale, &provenance, share).map_err(Error::from)
+    })?;
+    Ok((binned.counts(), settings.to_string()))
+}
+
+/// Bins, interpolated block by block.
+#[derive(Clone, Debug)]
+pub struct FilledBins {
+    /// The values.
+    pub dense: DenseBrdf,
+    /// Standard errors, where asked for.
+    pub errors: Option<ErrorBars>,
+    /// The settings, as chosen for the material.
+    pub settings: Settings,
+}
+
+/// Interpolates bins block by block, with the settings that suit the material, starting from `base`.
+///
+/// # Errors
+/// Too few bins, or too few frames for standard errors.
+pub fn fill_bins(
+    bins: &Bins,
+    base: Settings,
+    with_errors: bool,
+    progress: &Progress<'_>,
+) -> Result<FilledBins, Error> {
+    let known = sorted(bins, base, progress)?;
+    let settings = chosen(&known, base, progress)?;
+    let (dense, errors) = if with_errors {
+        let calibration = step(progress, Step::CalibratingErrorBars, |_| {
+            Calibration::new(&known, &settings).ok_or(Error::TooFewFrames)
+        })?;
+        let (dense, errors) = step(progress, Step::Interpolating, |share| {
+            interpolate::fill_with_errors(&known, &settings, &calibration, share)
+                .map_err(Error::from)
+        })?;
+        (dense, Some(errors))
+    } else {
+        let dense = step(progress, Step::Interpolating, |share| {
+            interpolate::fill(&known, &settings, share).map_err(Error::from)
+        })?;
+        (dense, None)
+    };
+    Ok(FilledBins {
+        dense,
+        errors,
+        settings,
+    })
+}
+
+fn sorted<'a>(bins: &'a Bins, base: Settings, progress: &Progress<'_>) -> Result<Known<'a>, Error> {
+    step(progress, Step::Sorting, |_| {
+        Ok(Known::thinned(bins, base.one_bin_in))
+    })
+}
+
+fn chosen(known: &Known<'_>, base: Settings, progress: &Progress<'_>) -> Result<Settings, Error> {
+    step(progress, Step::ChoosingSettings, |_| {
+        Ok(interpolate::select(known, base).settings)
+    })
+}
+
+/// Samples in their bins.
+struct Binned {
+    bins: Bins,
+    samples: usize,
+}
+
+impl Binned {
+    fn new(samples: SampleSet, grid: Grid, progress: &Progress<'_>) -> Result<Self, Error> {
+        let count = samples.samples.len();
+        let bins = step(progress, Step::Binning, |_| {
+            Ok::<_, Error>(Bins::new(grid, &samples.samples))
+        })?;
+        Ok(Self {
+            bins,
+            samples: count,
+        })
+    }
+
+    fn counts(&self) -> FillCounts {
+        let outside = self.bins.outside();
+        FillCounts {
+            binned: self.samples - outside,
+            outside,
+            bins: self.bins.bins().len(),
+            failed: 0,
+            raised: 0,
+        }
+    }
+}
+
+/// What a filled BRDF says of its making.
+fn provenance_of(settings: &str) -> Provenance {
+    let mut facts = of_this_program();
+    facts.insert("interpolation".into(), settings.to_owned());
+    facts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_have_names() {
+        assert_eq!("default".parse(), Ok(FillMethod::Blocks));
+        assert_eq!(
+            "paper".parse(),
+            Ok(FillMethod::Cellwise(CellSettings::PAPER))
+        );
+        assert!("papers".parse::<FillMethod>().is_err());
+    }
+
+    #[test]
+    fn options_that_are_not_possible_are_named_in_a_line() {
+        let wrong = |change: fn(&mut FillOptions)| {
+            let mut options = FillOptions::default();
+            change(&mut options);
+            options.check().unwrap_err().to_string()
+        };
+        for (found, option) in [
+            (wrong(|o| o.step_deg = 7.7), "--step 7.7"),
+            (wrong(|o| o.block_deg = Some(1.0)), "--block 1"),
+            (wrong(|o| o.nodes = Some(7)), "--nodes 7"),
+            (wrong(|o| o.tolerance = Some(f32::NAN)), "--tolerance NaN"),
+            (
+                wrong(|o| {
+                    o.with_errors = true;
+                    o.method = FillMethod::Cellwise(CellSettings::PAPER);
+                }),
+                "--error with --method",
+            ),
+        ] {
+            assert!(found.starts_with(option), "{found}");
+            assert_eq!(found.lines().count(), 1);
+        }
+        assert!(FillOptions::with_step_deg(30.0).check().is_ok());
+    }
+}

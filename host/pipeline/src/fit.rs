@@ -1,0 +1,151 @@
+//! A model's parameters from a dense BRDF, or from the samples behind it.
+
+use crate::Error;
+use crate::compare::{Options, Side, Table, compare};
+use crate::progress::{Progress, Step, step};
+use crate::provenance::of_this_program;
+use gonia_brdf::fit::{self, Cell, Family, Settings};
+use gonia_brdf::{Bins, DenseBrdf, Sample};
+use gonia_formats::dense_exr::write_dense;
+use gonia_formats::fit_toml::FitNote;
+use gonia_rig::{DenseFile, Figures, Scale};
+use std::path::Path;
+use std::time::Instant;
+
+/// A fitted model, tabulated, with its parameters and how far it is from what it was fitted to.
+#[derive(Clone, Debug)]
+pub struct FitResult {
+    /// Parameters with their standard uncertainties, and the error by stratum.
+    pub note: FitNote,
+    /// The model on the grid of the dense BRDF.
+    pub dense: DenseBrdf,
+}
+
+/// Cells to fit to: of the dense BRDF itself, half of them spread evenly and half where it is bright.
+pub fn cells_of_dense(dense: &DenseBrdf, settings: &Settings) -> Vec<Cell> {
+    fit::draw(dense, settings.cells, settings.seed)
+}
+
+/// Cells to fit to: the bins of samples on the grid of a dense BRDF, as they were measured.
+///
+/// # Errors
+/// No sample lies on the grid.
+pub fn cells_of_samples(
+    dense: &DenseBrdf,
+    samples: &[Sample],
+    settings: &Settings,
+) -> Result<Vec<Cell>, Error> {
+    let bins = Bins::new(dense.grid(), samples);
+    let cells = fit::draw_measured(&bins, settings.cells, settings.seed);
+    if cells.is_empty() {
+        return Err(Error::NoSampleOnGrid);
+    }
+    Ok(cells)
+}
+
+/// Fits a model to cells, tabulates it on the grid of `measured` and compares it with that. `name` is
+/// what the figures call `measured`.
+///
+/// # Errors
+/// No positive value to fit, or none to compare.
+pub fn fit_model(
+    measured: &DenseFile,
+    name: &str,
+    cells: &[Cell],
+    family: Family,
+    settings: &Settings,
+    progress: &Progress<'_>,
+) -> Result<FitResult, Error> {
+    let family = family.for_values(measured.scale == Scale::Relative);
+    let start = Instant::now();
+    let fit = step(progress, Step::FittingModel, |share| {
+        fit::fit(cells, family, settings, share).map_err(Error::from)
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    let dense = step(progress, Step::Tabulating, |_| {
+        // A fit always has as many parameters as its family.
+        let model = fit.model().ok_or(fit::FitError::NotPositive)?;
+        Ok::<_, Error>(DenseBrdf::tabulate(measured.brdf.grid(), model.as_ref()))
+    })?;
+    let figures = step(progress, Step::Comparing, |_| {
+        against(&dense, &family.to_string(), measured, name)
+    })?;
+    let note = FitNote::new(&fit, seconds, figures);
+    Ok(FitResult { note, dense })
+}
+
+/// How far a table is from a measured one, as it is: the fit was made in the measured one's scale.
+fn against(
+    dense: &DenseBrdf,
+    name: &str,
+    measured: &DenseFile,
+    measured_name: &str,
+) -> Result<Figures, Error> {
+    let absolute = |brdf| Table {
+        brdf,
+        scale: Scale::Absolute,
+    };
+    let options = Options {
+        name_a: name,
+        name_b: measured_name,
+        ..Options::default()
+    };
+    let other = Side::Table(absolute(&measured.brdf));
+    Ok(compare(absolute(dense), other, &options)?)
+}
+
+/// Writes the tabulated model, and its note beside it.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_fit(path: &Path, result: FitResult, scale: Scale) -> Result<(), Error> {
+    let note = &result.note;
+    let mut provenance = of_this_program();
+    let state = if note.converged {
+        String::new()
+    } else {
+        ", NOT CONVERGED: the best so far".to_owned()
+    };
+    provenance.insert(
+        "fit".into(),
+        format!("{} fitted to {}{state}", note.model, note.figures.b),
+    );
+    let numbers: Vec<String> = note
+        .parameters
+        .iter()
+        .map(|p| format!("{} {}", p.name, five_digits(p.value)))
+        .collect();
+    provenance.insert("fit_parameters".into(), numbers.join(", "));
+    note.write(&FitNote::path_beside(path))?;
+    write_dense(
+        path,
+        DenseFile {
+            brdf: result.dense,
+            scale,
+            provenance,
+        },
+    )?;
+    Ok(())
+}
+
+/// A number with five significant digits.
+pub fn five_digits(value: f64) -> String {
+    let digits = 4 - value.abs().max(1e-9).log10().floor() as i32;
+    format!("{value:.*}", digits.clamp(0, 8) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_five_digits() {
+        for (value, text) in [
+            (0.140_004_9, "0.14000"),
+            (113.0109, "113.01"),
+            (0.0, "0.00000000"),
+        ] {
+            assert_eq!(five_digits(value), text);
+        }
+    }
+}

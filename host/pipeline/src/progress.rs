@@ -1,0 +1,131 @@
+//! What a caller hears of the work, and how it ends it early.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// A step of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Step {
+    /// Registration, sampling and calibration of the frames.
+    FramesToSamples,
+    /// Samples are put into bins.
+    Binning,
+    /// Bins are sorted for the search of neighbourhoods.
+    Sorting,
+    /// Cross-validation chooses the coordinates of the interpolation.
+    ChoosingSettings,
+    /// Cross-validation calibrates the standard errors.
+    CalibratingErrorBars,
+    /// Blocks are fitted, before rows are made of them: only on grids that do not fit memory.
+    FittingBlocks,
+    /// Every cell gets its value.
+    Interpolating,
+    /// Rows are made and written: only on grids that do not fit memory.
+    InterpolatingAndWriting,
+    /// A model's parameters are searched.
+    FittingModel,
+    /// A fitted model is evaluated on the grid.
+    Tabulating,
+    /// Two BRDFs are compared.
+    Comparing,
+    /// The paper's method interpolates the check cells.
+    PaperMethod,
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Step::FramesToSamples => "frames to samples",
+            Step::Binning => "binning",
+            Step::Sorting => "sorting",
+            Step::ChoosingSettings => "choosing settings",
+            Step::CalibratingErrorBars => "calibrating error bars",
+            Step::FittingBlocks => "fitting",
+            Step::Interpolating => "interpolating",
+            Step::InterpolatingAndWriting => "interpolating and writing",
+            Step::FittingModel => "fitting the model",
+            Step::Tabulating => "tabulating the model",
+            Step::Comparing => "comparing",
+            Step::PaperMethod => "the paper's method",
+        })
+    }
+}
+
+/// Called with a step and its share done: 0 once as it begins, then shares between 0 and 1 from any
+/// thread, and 1 once when it has ended well. Whoever returns [`ControlFlow::Break`] gets
+/// [`Error::Cancelled`](crate::Error::Cancelled) soon after.
+pub type Progress<'a> = dyn Fn(Step, f64) -> ControlFlow<()> + Sync + 'a;
+
+/// A [`Progress`] for callers who do not want to know.
+pub fn silent(_: Step, _: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// The caller has ended the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+/// Shares that work reports lie between those that mean begin and end.
+const INSIDE: std::ops::RangeInclusive<f64> = 1e-9..=1.0 - 1e-9;
+
+/// Runs a step. The work is given a function to call with its share done.
+pub(crate) fn step<T, E: From<Cancelled>>(
+    progress: &Progress<'_>,
+    step: Step,
+    work: impl FnOnce(&(dyn Fn(f64) + Sync)) -> Result<T, E>,
+) -> Result<T, E> {
+    if progress(step, 0.0).is_break() {
+        return Err(Cancelled.into());
+    }
+    let is_cancelled = AtomicBool::new(false);
+    let value = work(&|share: f64| {
+        if progress(step, share.clamp(*INSIDE.start(), *INSIDE.end())).is_break() {
+            is_cancelled.store(true, Relaxed);
+        }
+    })?;
+    if is_cancelled.into_inner() || progress(step, 1.0).is_break() {
+        return Err(Cancelled.into());
+    }
+    Ok(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn a_step_begins_once_and_ends_once() {
+        let heard = Mutex::new(Vec::new());
+        let progress = |_: Step, share: f64| {
+            heard.lock().unwrap().push(share);
+            ControlFlow::Continue(())
+        };
+        let value = step::<_, Cancelled>(&progress, Step::Binning, |tell| {
+            tell(0.0);
+            tell(1.0);
+            Ok(3)
+        });
+        assert_eq!(value, Ok(3));
+        let heard = heard.into_inner().unwrap();
+        assert_eq!((heard[0], heard[3], heard.len()), (0.0, 1.0, 4));
+        assert!(heard[1] > 0.0 && heard[2] < 1.0);
+    }
+
+    #[test]
+    fn a_break_cancels_at_the_beginning_in_the_middle_and_at_the_end() {
+        for at in [0.0, 0.5, 1.0] {
+            let progress = |_: Step, share: f64| match share >= at {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            };
+            let result = step::<_, Cancelled>(&progress, Step::Binning, |tell| {
+                tell(0.5);
+                Ok(())
+            });
+            assert_eq!(result, Err(Cancelled));
+        }
+    }
+}

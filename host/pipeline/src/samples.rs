@@ -1,0 +1,140 @@
+//! Frames → samples: of a capture folder, or of any [`FrameSource`].
+
+use crate::Error;
+use crate::process::{
+    FrameSource, Hidden, Masks, Outcome, ProcessError, Processed, Sampled, Stage, process,
+    process_sampled,
+};
+use crate::progress::{Progress, Step, step};
+use gonia_formats::CaptureFolder;
+use gonia_formats::summary::{FrameCounts, Refused};
+use gonia_rig::{FrameRow, Rig, Role, SampleSet, Scale};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Samples of a capture folder's frames (`rig.toml`, `frames.csv` and the frames that it names).
+///
+/// # Errors
+/// The folder or one of its files cannot be read, or no frame gives a sample.
+pub fn samples_of_folder(folder: &Path, progress: &Progress<'_>) -> Result<Processed, Error> {
+    let folder = CaptureFolder::open(folder)?;
+    samples_of(folder.rig(), &folder, &Masks::default(), progress)
+}
+
+/// Samples of a source's frames. `masks` are those of another session's reference, for poses at
+/// which this source has no frame of the reference.
+///
+/// # Errors
+/// A frame cannot be had, or none gives a sample.
+pub fn samples_of(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    masks: &Masks,
+    progress: &Progress<'_>,
+) -> Result<Processed, Error> {
+    watched(source.rows(), progress, |tell| {
+        process(rig, source, masks, tell)
+    })
+}
+
+/// Samples of frames that come sampled, as a session keeps them.
+///
+/// # Errors
+/// As [`samples_of`].
+pub fn samples_of_sampled(
+    rig: &Rig,
+    rows: &[FrameRow],
+    sampled: &(
+         dyn Fn(&FrameRow, Hidden) -> Result<crate::process::SampledFrame, ProcessError> + Sync
+     ),
+    progress: &Progress<'_>,
+) -> Result<Processed, Error> {
+    let sampled: Sampled = sampled;
+    watched(rows, progress, |tell| {
+        process_sampled(rig, rows, sampled, &Masks::default(), tell)
+    })
+}
+
+fn watched(
+    rows: &[FrameRow],
+    progress: &Progress<'_>,
+    work: impl FnOnce(
+        &(dyn Fn(Stage, usize) -> ControlFlow<()> + Sync),
+    ) -> Result<Processed, ProcessError>,
+) -> Result<Processed, Error> {
+    let reference = rows
+        .iter()
+        .filter(|row| row.role == Role::Reference)
+        .count();
+    let total = rows.len().max(1) as f64;
+    let processed = step(progress, Step::FramesToSamples, |_| {
+        work(&|stage, done| {
+            let before = match stage {
+                Stage::Reference => 0,
+                Stage::Material => reference,
+            };
+            let share = (before + done) as f64 / total;
+            // The last frame is not the end of the step.
+            progress(Step::FramesToSamples, share.min(1.0 - 1e-9))
+        })
+        .map_err(Error::from)
+    })?;
+    if processed.samples.is_empty() {
+        let why = processed
+            .frame_counts()
+            .refused
+            .into_iter()
+            .max_by_key(|refused| refused.count)
+            .map_or("every point was left out".to_owned(), |r| r.reason);
+        return Err(Error::NoSamples {
+            frames: rows.len(),
+            why,
+        });
+    }
+    Ok(processed)
+}
+
+impl Processed {
+    /// Whether the samples are in 1/sr.
+    pub fn scale(&self) -> Scale {
+        if self.compensation.is_absolute() {
+            Scale::Absolute
+        } else {
+            Scale::Relative
+        }
+    }
+
+    /// The samples with their scale.
+    pub fn into_sample_set(self) -> SampleSet {
+        SampleSet {
+            scale: self.scale(),
+            samples: self.samples,
+        }
+    }
+
+    /// Frames used, and frames refused by reason.
+    pub fn frame_counts(&self) -> FrameCounts {
+        let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
+        let mut kept = 0;
+        for frame in &self.frames {
+            match frame.outcome {
+                Outcome::Refused(refusal) => {
+                    // Numbers in a reason would make every frame a reason of its own.
+                    let words = refusal
+                        .to_string()
+                        .replace(|c: char| c.is_ascii_digit(), "#");
+                    *reasons.entry(words).or_default() += 1;
+                }
+                Outcome::Locked | Outcome::FellBack(_) => kept += 1,
+            }
+        }
+        FrameCounts {
+            kept,
+            refused: reasons
+                .into_iter()
+                .map(|(reason, count)| Refused { reason, count })
+                .collect(),
+        }
+    }
+}

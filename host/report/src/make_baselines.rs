@@ -1,0 +1,64 @@
+//! The baselines of a measurement's folder: made, compared, written and drawn.
+
+use crate::folder::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
+use crate::rivals::{Row, draw_row, figure};
+use gonia_formats::dense_exr::{read_dense, write_dense};
+use gonia_formats::rivals_toml::Rivals;
+use gonia_formats::samples::read_samples;
+use gonia_formats::write_whole_bytes;
+use gonia_pipeline::baselines::{BaselineOptions, Made, Measurement};
+use gonia_pipeline::fit::write_fit;
+use gonia_pipeline::{Error, Progress};
+use std::path::Path;
+
+/// The samples behind the dense BRDF.
+const SAMPLES: &str = "samples.npy";
+
+/// Makes the baselines of a folder that holds `dense.exr` and `samples.npy` (with frame numbers), on
+/// its own grid or on a coarser one of `step_deg`. Writes each as `NAME.exr`, the comparison as
+/// `rivals.toml`, and its figure as `rivals.svg`.
+///
+/// # Errors
+/// A file that cannot be read or written, or a baseline that cannot be made.
+pub fn make_baselines(
+    folder: &Path,
+    step_deg: Option<f64>,
+    options: &BaselineOptions,
+    progress: &Progress<'_>,
+) -> Result<Rivals, Error> {
+    let path = |name: &str| folder.join(name);
+    let samples = read_samples(&path(SAMPLES))?;
+    let dense = read_dense(&path(DENSE))?;
+    let truth = match path(TRUTH).exists() {
+        true => Some(read_dense(&path(TRUTH))?),
+        false => None,
+    };
+    let measurement = Measurement::new(dense, truth, samples, step_deg)?;
+    let mut rows: Vec<Row> = vec![draw_row("dense", measurement.dense())];
+    let comparison = measurement.baselines(
+        options,
+        &mut |rival, made| {
+            match made {
+                Made::Measured => {}
+                Made::Filled(name, file) => {
+                    if name == "sparse" {
+                        rows.push(draw_row(&rival.name, &file.brdf));
+                    }
+                    write_dense(&path(&format!("{name}.exr")), file)?;
+                }
+                Made::Fitted(result, scale) => {
+                    rows.push(draw_row(&rival.name, &result.dense));
+                    write_fit(&path(&format!("{}.exr", rival.name)), result, scale)?;
+                }
+            }
+            Ok::<(), Error>(())
+        },
+        progress,
+    )?;
+    comparison.write(&path(RIVALS))?;
+    write_whole_bytes(
+        &path(RIVALS_FIGURE).with_extension("svg"),
+        figure(&rows).as_bytes(),
+    )?;
+    Ok(comparison)
+}
