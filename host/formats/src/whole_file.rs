@@ -62,8 +62,15 @@ pub fn check_writable(folder: &Path) -> Result<(), FileError> {
 /// Makes sure that a file can be written at `file`: its folder is made and written to.
 ///
 /// # Errors
-/// As [`check_writable`].
+/// As [`check_writable`], and a folder of that name.
 pub fn check_writable_beside(file: &Path) -> Result<(), FileError> {
+    if file.is_dir() {
+        return Err(FileError::new(
+            file,
+            "is a folder",
+            "give the name of a file in it",
+        ));
+    }
     check_writable(folder_of(file))
 }
 

@@ -1,11 +1,10 @@
 //! CPU time.
 
-use rustix::time::{ClockId, clock_gettime};
+use cpu_time::ProcessTime;
 
-/// Seconds that all threads of this program have worked so far.
+/// Seconds that all threads of this program have worked so far; NaN where the system does not say.
 pub fn cpu_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+    ProcessTime::try_now().map_or(f64::NAN, |now| now.as_duration().as_secs_f64())
 }
 
 #[cfg(test)]
