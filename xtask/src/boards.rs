@@ -4,6 +4,7 @@ use crate::size::{budget_of, size_of};
 use crate::tools::{add_targets, cargo, root, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The board that runs in QEMU.
 const QEMU_BOARD: &str = "qemu-mps2";
@@ -23,6 +24,34 @@ pub fn size() -> Result<()> {
         run(cargo(&board).args(["build", "--release"]))?;
     }
     check_sizes(&root)
+}
+
+/// Builds every board and leaves its image in `target/images`: ELF for a debugger, and plain bytes.
+pub fn images() -> Result<()> {
+    build()?;
+    run(Command::new("rustup").args(["component", "add", "llvm-tools"]))?;
+    let objcopy = objcopy()?;
+    let root = root()?;
+    let out = root.join("target/images");
+    std::fs::create_dir_all(&out).with_context(|| format!("{}", out.display()))?;
+    for board in folders(&root)? {
+        let program = program_of(&board)?;
+        let image = out.join(format!("gonia-{}", name_of(&board)));
+        let (elf, bin) = (image.with_extension("elf"), image.with_extension("bin"));
+        std::fs::copy(&program, &elf).with_context(|| format!("{}", program.display()))?;
+        let mut objcopy = Command::new(&objcopy);
+        run(objcopy.args(["-O", "binary"]).arg(&elf).arg(&bin))?;
+        println!("{}\n{}", elf.display(), bin.display());
+    }
+    Ok(())
+}
+
+/// The objcopy of the component llvm-tools: it knows every chip that the compiler knows.
+fn objcopy() -> Result<PathBuf> {
+    let arguments = ["--print", "target-libdir"];
+    let output = Command::new("rustc").args(arguments).output()?;
+    let libraries = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
+    Ok(libraries.with_file_name("bin").join("llvm-objcopy"))
 }
 
 /// Adds every board's target to the toolchain.

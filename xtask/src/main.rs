@@ -15,55 +15,36 @@ mod table;
 mod tools;
 mod windows;
 
-use anyhow::Result;
 use std::process::ExitCode;
 
-/// A chore: its word, what it does, and where.
-type Chore = (&'static str, &'static str, fn() -> Result<()>);
-
-const CHORES: &[Chore] = &[
-    (
-        "test",
-        "set up what the tests need, then all that a change must pass",
-        steps::test,
-    ),
-    (
-        "doors",
-        "which crate may use which, which file imports which, how long functions are",
-        steps::doors,
-    ),
-    ("boards", "build the firmware of every board", boards::build),
-    (
-        "size",
-        "flash and RAM of every board against its budget",
-        boards::size,
-    ),
-    (
-        "fuzz",
-        "let the fuzzer loose on the protocol for a minute a target",
-        steps::fuzz,
-    ),
-    (
-        "windows",
-        "run the demo under Wine: the same bytes as on Linux",
-        windows::compare_with_linux,
-    ),
-    (
-        "book",
-        "check the links of all pages and build the book into docs/book",
-        book::book,
-    ),
-];
+const USAGE: &str = "\
+cargo xtask test     set up what the tests need, then all that a change must pass
+cargo xtask doors    which crate may use which, which file imports which, how long functions are
+cargo xtask boards   build the firmware of every board
+cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/images
+cargo xtask size     flash and RAM of every board against its budget
+cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
+cargo xtask windows  run the demo under Wine: the same bytes as on Linux
+cargo xtask book     check the links of all pages and build the book in docs/book";
 
 fn main() -> ExitCode {
-    let word = std::env::args().nth(1).unwrap_or_default();
-    let Some((_, _, chore)) = CHORES.iter().find(|chore| chore.0 == word) else {
-        for (word, what, _) in CHORES {
-            eprintln!("cargo xtask {word:<8} {what}");
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let outcome = match command.as_str() {
+        "test" => steps::test(),
+        "doors" => steps::doors(),
+        "boards" => boards::build(),
+        "images" => boards::images(),
+        "size" => boards::size(),
+        "fuzz" => steps::fuzz(),
+        "windows" => windows::compare_with_linux(),
+        "book" => book::book(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
         }
-        return ExitCode::from(2);
     };
-    match chore() {
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("xtask: {error:#}");
