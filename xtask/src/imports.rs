@@ -67,11 +67,25 @@ fn roots_of(metadata: &Value) -> Vec<String> {
 /// Who imports whom. What a file imports from its parents, or from below itself, is not in it.
 fn graph_of(modules: &[Module]) -> Graph {
     let names: BTreeSet<&[String]> = modules.iter().map(|m| m.name.as_slice()).collect();
-    let mut graph = Graph::new();
-    for module in modules {
+    let paths_of = |module: &Module| {
         let mut paths = Vec::new();
         collect(&module.tokens, &module.name, &names, &mut paths);
-        let files = paths.iter().map(|path| file_of(path, &names));
+        paths
+    };
+    let paths: Vec<_> = modules.iter().map(paths_of).collect();
+    // Where a name leads that a file has imported, and may hand on.
+    let mut handed_on = BTreeMap::new();
+    for (module, paths) in modules.iter().zip(&paths) {
+        for path in paths {
+            let name = path.last().into_iter().cloned();
+            handed_on.insert(module.name.iter().cloned().chain(name).collect(), path);
+        }
+    }
+    let mut graph = Graph::new();
+    for (module, paths) in modules.iter().zip(&paths) {
+        let files = paths
+            .iter()
+            .flat_map(|path| files_of(path, &names, &handed_on));
         let others = files.filter(|f| !f.starts_with(&module.name) && !module.name.starts_with(f));
         graph.insert(
             module.name.clone(),
@@ -81,11 +95,29 @@ fn graph_of(modules: &[Module]) -> Graph {
     graph
 }
 
-/// The file that a path leads into: the longest of its beginnings that names one.
-fn file_of<'a>(path: &'a [String], names: &BTreeSet<&[String]>) -> &'a [String] {
-    let lengths = (0..=path.len()).rev();
-    let mut beginnings = lengths.map(|n| &path[..n]);
-    beginnings.find(|p| names.contains(p)).unwrap_or_default()
+/// The files that a path leads into: the one that its longest beginning names, and, where that one
+/// only hands on a name, the one where it comes from.
+fn files_of<'a>(
+    path: &'a [String],
+    names: &BTreeSet<&[String]>,
+    handed_on: &BTreeMap<Vec<String>, &'a Vec<String>>,
+) -> Vec<&'a [String]> {
+    let mut files: Vec<&[String]> = Vec::new();
+    let mut path = path;
+    loop {
+        let lengths = (0..=path.len()).rev();
+        let mut beginnings = lengths.map(|n| &path[..n]);
+        let file = beginnings.find(|p| names.contains(p)).unwrap_or_default();
+        if files.contains(&file) {
+            return files;
+        }
+        files.push(file);
+        let name = path.get(..=file.len());
+        match name.and_then(|name| handed_on.get(name)) {
+            Some(from) => path = from.as_slice(),
+            None => return files,
+        }
+    }
 }
 
 /// Finds the paths into this crate that a module names: in `use`, and wherever else `crate::`,
@@ -306,6 +338,20 @@ mod tests {
             ("b", "use crate::a::X;"),
         ];
         assert_eq!(pairs(&files), ["a b"]);
+    }
+
+    #[test]
+    fn a_name_that_a_folder_hands_on_is_imported_from_its_file_too() {
+        let files = [
+            ("", "mod a;"),
+            (
+                "a",
+                "mod one; mod two; pub use one::{X, Z}; pub use two::Y;",
+            ),
+            ("a::one", "use super::Y;"),
+            ("a::two", "use crate::a::X;"),
+        ];
+        assert_eq!(pairs(&files), ["a::one a::two"]);
     }
 
     #[test]
