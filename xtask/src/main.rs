@@ -1,26 +1,44 @@
 //! The project's own chores. `cargo xtask test` does all that a change must pass.
 
+mod boards;
+mod book;
+mod doors;
 mod fuzz;
+mod imports;
+mod length;
+mod links;
+mod modules;
 mod size;
 mod steps;
+mod systems;
+mod table;
 mod tools;
+mod windows;
 
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-cargo xtask test    set up what the tests need, then fmt, clippy, boards, all tests, a short fuzz
-cargo xtask boards  build the firmware of every board
-cargo xtask size    flash and RAM of every board against its budget
-cargo xtask fuzz    let the fuzzer loose on the protocol for a minute a target";
+cargo xtask test     set up what the tests need, then all that a change must pass
+cargo xtask doors    which crate may use which, which file imports which, how long functions are
+cargo xtask boards   build the firmware of every board
+cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/images
+cargo xtask size     flash and RAM of every board against its budget
+cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
+cargo xtask windows  run the demo under Wine: the same bytes as on Linux
+cargo xtask book     check the links of all pages and build the book in docs/book";
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     let command = arguments.next().unwrap_or_default();
     let outcome = match command.as_str() {
         "test" => steps::test(),
-        "boards" => steps::boards(),
-        "size" => steps::size(),
+        "doors" => steps::doors(),
+        "boards" => boards::build(),
+        "images" => boards::images(),
+        "size" => boards::size(),
         "fuzz" => steps::fuzz(),
+        "windows" => windows::compare_with_linux(),
+        "book" => book::book(),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

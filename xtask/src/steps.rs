@@ -1,151 +1,137 @@
 //! What the chores do, step by step.
 
-use crate::fuzz;
-use crate::size::{budget_of, size_of};
-use crate::tools::{TARGET, add_target, install, install_library, run};
-use anyhow::{Context, Result, bail};
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Instant;
-
-/// The board that runs in QEMU.
-const QEMU_BOARD: &str = "qemu-mps2";
+use crate::table::Table;
+use crate::tools::{cargo, install, install_library, root, run};
+use crate::{boards, book, doors, fuzz, imports, length, links, systems};
+use anyhow::{Result, bail};
+use std::path::Path;
 
 /// What the feature `genicam` is built with.
 const ARAVIS: [&str; 3] = ["libaravis-dev", "libusb-1.0-0-dev", "pkg-config"];
 
-/// All that a change must pass.
+/// All that a change must pass: what is quickest to fail comes first.
 pub fn test() -> Result<()> {
     let root = root()?;
     let mut table = Table::default();
-    table.step("target for the boards", add_target)?;
-    let qemu = install("qemu-system-arm", "qemu-system-arm");
-    let genicam = install_library("aravis-0.8", &ARAVIS);
-    table.step("format", || {
-        run(cargo(&root).args(["fmt", "--all", "--check"]))?;
-        for board in board_folders(&root)? {
-            run(cargo(&board).args(["fmt", "--check"]))?;
-        }
-        Ok(())
-    })?;
-    table.step("clippy", || {
-        run(cargo(&root).args([
-            "clippy",
-            "--workspace",
-            "--all-targets",
-            "--",
-            "-D",
-            "warnings",
-        ]))
-    })?;
-    // With the cameras, if their library is there; without, the step above has looked at it all.
-    let features: &[&str] = if genicam {
-        &["--features", "gonia/genicam"]
-    } else {
-        &[]
-    };
-    if genicam {
-        table.step("clippy with GenICam", || {
-            run(cargo(&root)
-                .args(["clippy", "--workspace", "--all-targets"])
-                .args(features)
-                .args(["--", "-D", "warnings"]))
-        })?;
-    } else {
-        table.not_run(
-            "sessions through GigE Vision",
-            &format!(
-                "the library aravis is missing: apt-get install {}",
-                ARAVIS.join(" ")
-            ),
-        );
-    }
-    table.step("boards", || build_boards(&root))?;
-    table.step("size of the boards", || check_sizes(&root))?;
-    table.step("tests", || {
-        run(cargo(&root).args(["test", "--workspace"]).args(features))
-    })?;
-    // Here and below with the whole workspace's features, as all has been built for the tests above.
-    table.step("sessions that are killed", || {
-        run(cargo(&root)
-            .args(["test", "--workspace", "--test", "capture"])
-            .args(features)
-            .args(["--", "--ignored", "--nocapture", "--test-threads", "1"]))
-    })?;
-    if qemu {
-        table.step("firmware in QEMU", || {
-            run(cargo(&root)
-                .args(["test", "--workspace", "--test", "controllers_qemu"])
-                .args(features)
-                .args(["--", "--ignored", "--nocapture"])
-                .env("GONIA_QEMU_ELF", qemu_elf(&root)))
-        })?;
-    } else {
-        table.not_run(
-            "firmware in QEMU",
-            "qemu-system-arm is missing: apt-get install qemu-system-arm",
-        );
-    }
-    if install("chromium", "chromium") {
-        table.step("report and live page in a browser", || {
-            run(cargo(&root)
-                .args(["test", "--workspace", "--test", "browser"])
-                .args(features)
-                .args(["--test", "browser_live"])
-                .args(["--", "--ignored"])
-                .env("GONIA_BROWSER", "chromium"))
-        })?;
-    } else {
-        table.not_run(
-            "report and live page in a browser",
-            "chromium is missing: apt-get install chromium",
-        );
-    }
+    read_sources(&mut table, &root)?;
+    let features = genicam(&mut table);
+    compile(&mut table, &root, features)?;
+    run_tests(&mut table, &root, features)?;
     fuzz_all(&mut table, &root, FUZZ_BRIEFLY_S)?;
     table.print();
     Ok(())
 }
 
-/// Builds the firmware of every board.
-pub fn boards() -> Result<()> {
-    add_target()?;
-    build_boards(&root()?)
+/// Which crate may use which, which file may import which, how long a function may be.
+pub fn doors() -> Result<()> {
+    let mut table = Table::default();
+    check_doors(&mut table, &root()?)?;
+    table.print();
+    Ok(())
 }
 
-/// Prints what each board's program takes, and fails when one is over its budget.
-pub fn size() -> Result<()> {
-    add_target()?;
-    let root = root()?;
-    for board in board_folders(&root)? {
-        run(cargo(&board).args(["build", "--release"]))?;
+fn check_doors(table: &mut Table, root: &Path) -> Result<()> {
+    let mut workspaces = vec![root.to_owned(), root.join("protocol/fuzz")];
+    workspaces.extend(boards::folders(root)?);
+    // All three, so that one run names all that is to be done.
+    let outcomes = [
+        table.step("doors between crates", || doors::check(&workspaces)),
+        table.step("imports between files", || {
+            imports::check(&doors::metadata(root)?, root)
+        }),
+        table.step("length of functions", || length::check(root)),
+    ];
+    let faults = outcomes.into_iter().filter_map(Result::err);
+    let faults: Vec<String> = faults.map(|error| format!("{error:#}")).collect();
+    if !faults.is_empty() {
+        bail!("{}", faults.join("\n\n"));
     }
-    check_sizes(&root)
+    Ok(())
 }
 
-fn check_sizes(root: &Path) -> Result<()> {
-    println!("{:<12} {:>9} {:>9}   budget", "board", "flash", "RAM");
-    let mut over = Vec::new();
-    for folder in board_folders(root)? {
-        let name = name_of(&folder);
-        let size = size_of(&program_of(&folder))?;
-        let verdict = match budget_of(&name) {
-            None => "none: it carries the simulated machine and ships nowhere".to_owned(),
-            Some(budget) => {
-                let is_within = size.is_within(budget);
-                if !is_within {
-                    over.push(name.clone());
-                }
-                let word = if is_within { "within" } else { "OVER" };
-                format!("{word} {} and {} bytes", budget.flash, budget.ram)
-            }
-        };
-        println!("{name:<12} {:>9} {:>9}   {verdict}", size.flash, size.ram);
+/// What needs no compiler.
+fn read_sources(table: &mut Table, root: &Path) -> Result<()> {
+    check_doors(table, root)?;
+    table.step("links", || links::check(root))?;
+    match book::installed(root) {
+        Some(program) => table.step("book", || book::build(root, &program))?,
+        None => table.not_run("book", "mdbook is missing: cargo xtask book installs it"),
     }
-    if !over.is_empty() {
-        bail!(
-            "over budget: {}; make the firmware smaller",
-            over.join(", ")
-        );
+    table.step("format", || {
+        run(cargo(root).args(["fmt", "--all", "--check"]))?;
+        for board in boards::folders(root)? {
+            run(cargo(&board).args(["fmt", "--check"]))?;
+        }
+        Ok(())
+    })
+}
+
+/// The features that everything is built with: the cameras, if their library is there.
+fn genicam(table: &mut Table) -> &'static [&'static str] {
+    if install_library("aravis-0.8", &ARAVIS) {
+        return &["--features", "gonia/genicam"];
+    }
+    let packages = ARAVIS.join(" ");
+    let why = format!("the library aravis is missing: apt-get install {packages}");
+    table.not_run("sessions through GigE Vision", &why);
+    &[]
+}
+
+fn compile(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
+    table.step("clippy", || {
+        run(cargo(root)
+            .args(["clippy", "--workspace", "--all-targets"])
+            .args(features)
+            .args(["--", "-D", "warnings"]))
+    })?;
+    if !features.is_empty() {
+        // As most people build it. The tests are the same with and without, and have been looked at.
+        table.step("clippy without GenICam", || {
+            run(cargo(root).args(["clippy", "--workspace", "--", "-D", "warnings"]))
+        })?;
+    }
+    systems::check(table, root)?;
+    table.step("targets of the boards", || boards::add_boards_targets(root))?;
+    table.step("boards", || boards::build_all(root))?;
+    table.step("size of the boards", || boards::check_sizes(root))
+}
+
+fn run_tests(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
+    table.step("tests", || {
+        run(cargo(root).args(["test", "--workspace"]).args(features))
+    })?;
+    // Here and below with the whole workspace's features, as all has been built for the tests above.
+    let ignored = |tests: &[&str], flags: &[&str]| {
+        let mut command = cargo(root);
+        command.args(["test", "--workspace"]).args(features);
+        for test in tests {
+            command.args(["--test", test]);
+        }
+        command.args(["--", "--ignored"]).args(flags);
+        command
+    };
+    table.step("sessions that are killed", || {
+        run(&mut ignored(
+            &["capture"],
+            &["--nocapture", "--test-threads", "1"],
+        ))
+    })?;
+    if install("qemu-system-arm", "qemu-system-arm") {
+        table.step("firmware in QEMU", || {
+            let elf = boards::qemu_elf(root)?;
+            run(ignored(&["controllers_qemu"], &["--nocapture"]).env("GONIA_QEMU_ELF", elf))
+        })?;
+    } else {
+        let why = "qemu-system-arm is missing: apt-get install qemu-system-arm";
+        table.not_run("firmware in QEMU", why);
+    }
+    if install("chromium", "chromium") {
+        table.step("report and live page in a browser", || {
+            run(ignored(&["browser", "browser_live"], &[]).env("GONIA_BROWSER", "chromium"))
+        })?;
+    } else {
+        let why = "chromium is missing: apt-get install chromium";
+        table.not_run("report and live page in a browser", why);
     }
     Ok(())
 }
@@ -175,95 +161,4 @@ fn fuzz_all(table: &mut Table, root: &Path, seconds: u32) -> Result<()> {
         })?;
     }
     Ok(())
-}
-
-fn build_boards(root: &Path) -> Result<()> {
-    for board in board_folders(root)? {
-        println!("board {}", board.display());
-        run(cargo(&board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
-        run(cargo(&board).args(["build", "--release"]))?;
-    }
-    Ok(())
-}
-
-fn board_folders(root: &Path) -> Result<Vec<PathBuf>> {
-    let folder = root.join("firmware/boards");
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(&folder).with_context(|| format!("{}", folder.display()))? {
-        let path = entry?.path();
-        if path.join("Cargo.toml").is_file() {
-            found.push(path);
-        }
-    }
-    found.sort();
-    Ok(found)
-}
-
-fn qemu_elf(root: &Path) -> PathBuf {
-    program_of(&root.join("firmware/boards").join(QEMU_BOARD))
-}
-
-/// The program of a board: each is named after its folder.
-fn program_of(board: &Path) -> PathBuf {
-    let program = format!("gonia-{}", name_of(board));
-    board
-        .join("target")
-        .join(TARGET)
-        .join("release")
-        .join(program)
-}
-
-fn name_of(board: &Path) -> String {
-    let name = board.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
-/// Cargo in a folder, without what an outer cargo passed down: the boards choose their own target.
-fn cargo(folder: &Path) -> Command {
-    let mut command = Command::new("cargo");
-    command.current_dir(folder);
-    for name in ["CARGO_TARGET_DIR", "CARGO_BUILD_TARGET", "RUSTFLAGS"] {
-        if folder.ends_with("boards") || folder.parent().is_some_and(|p| p.ends_with("boards")) {
-            command.env_remove(name);
-        }
-    }
-    command
-}
-
-fn root() -> Result<PathBuf> {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .map(Path::to_path_buf)
-        .context("xtask has no parent folder")
-}
-
-/// What ran, and for how long.
-#[derive(Default)]
-struct Table(Vec<String>);
-
-impl Table {
-    fn step(&mut self, name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
-        println!("== {name}");
-        let start = Instant::now();
-        work().with_context(|| name.to_string())?;
-        self.0.push(format!(
-            "passed  {name} ({:.0} s)",
-            start.elapsed().as_secs_f64()
-        ));
-        Ok(())
-    }
-
-    /// Red on a terminal that knows colours, and said twice: a test that did not run has not passed.
-    fn not_run(&mut self, name: &str, why: &str) {
-        let line = format!("\x1b[1;31mNOT RUN {name}: {why}\x1b[0m");
-        eprintln!("{line}");
-        self.0.push(line);
-    }
-
-    fn print(&self) {
-        println!();
-        for line in &self.0 {
-            println!("{line}");
-        }
-    }
 }

@@ -1,0 +1,173 @@
+//! The boards' firmware: a workspace and a target each.
+
+use crate::size::{budget_of, size_of};
+use crate::tools::{add_targets, cargo, root, run};
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The board that runs in QEMU.
+const QEMU_BOARD: &str = "qemu-mps2";
+
+/// Builds the firmware of every board.
+pub fn build() -> Result<()> {
+    let root = root()?;
+    add_boards_targets(&root)?;
+    build_all(&root)
+}
+
+/// Prints what each board's program takes, and fails when one is over its budget.
+pub fn size() -> Result<()> {
+    let root = root()?;
+    add_boards_targets(&root)?;
+    for board in folders(&root)? {
+        run(cargo(&board).args(["build", "--release"]))?;
+    }
+    check_sizes(&root)
+}
+
+/// Builds every board and leaves its image in `target/images`: ELF for a debugger, and plain bytes.
+pub fn images() -> Result<()> {
+    build()?;
+    run(Command::new("rustup").args(["component", "add", "llvm-tools"]))?;
+    let objcopy = objcopy()?;
+    let root = root()?;
+    let out = root.join("target/images");
+    std::fs::create_dir_all(&out).with_context(|| format!("{}", out.display()))?;
+    for board in folders(&root)? {
+        let program = program_of(&board)?;
+        let image = out.join(format!("gonia-{}", name_of(&board)));
+        let (elf, bin) = (image.with_extension("elf"), image.with_extension("bin"));
+        std::fs::copy(&program, &elf).with_context(|| format!("{}", program.display()))?;
+        let mut objcopy = Command::new(&objcopy);
+        run(objcopy.args(["-O", "binary"]).arg(&elf).arg(&bin))?;
+        println!("{}\n{}", elf.display(), bin.display());
+    }
+    Ok(())
+}
+
+/// The objcopy of the component llvm-tools: it knows every chip that the compiler knows.
+fn objcopy() -> Result<PathBuf> {
+    let arguments = ["--print", "target-libdir"];
+    let output = Command::new("rustc").args(arguments).output()?;
+    let libraries = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
+    Ok(libraries.with_file_name("bin").join("llvm-objcopy"))
+}
+
+/// Adds every board's target to the toolchain.
+pub fn add_boards_targets(root: &Path) -> Result<()> {
+    let boards = folders(root)?;
+    let mut targets = boards
+        .iter()
+        .map(|board| target_of(board))
+        .collect::<Result<Vec<_>>>()?;
+    targets.sort();
+    targets.dedup();
+    add_targets(&targets)
+}
+
+/// Lints and builds every board.
+pub fn build_all(root: &Path) -> Result<()> {
+    for board in folders(root)? {
+        println!("board {}", board.display());
+        run(cargo(&board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
+        run(cargo(&board).args(["build", "--release"]))?;
+    }
+    Ok(())
+}
+
+/// Compares what has been built with the budgets.
+pub fn check_sizes(root: &Path) -> Result<()> {
+    println!("{:<12} {:>9} {:>9}   budget", "board", "flash", "RAM");
+    let mut over = Vec::new();
+    for folder in folders(root)? {
+        let name = name_of(&folder);
+        let size = size_of(&program_of(&folder)?)?;
+        let verdict = match budget_of(&name) {
+            None => "none: it carries the simulated machine and ships nowhere".to_owned(),
+            Some(budget) => {
+                let is_within = size.is_within(budget);
+                if !is_within {
+                    over.push(name.clone());
+                }
+                let word = if is_within { "within" } else { "OVER" };
+                format!("{word} {} and {} bytes", budget.flash, budget.ram)
+            }
+        };
+        println!("{name:<12} {:>9} {:>9}   {verdict}", size.flash, size.ram);
+    }
+    if !over.is_empty() {
+        bail!(
+            "over budget: {}; make the firmware smaller",
+            over.join(", ")
+        );
+    }
+    Ok(())
+}
+
+/// The folder of every board.
+pub fn folders(root: &Path) -> Result<Vec<PathBuf>> {
+    let folder = root.join("firmware/boards");
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(&folder).with_context(|| format!("{}", folder.display()))? {
+        let path = entry?.path();
+        if path.join("Cargo.toml").is_file() {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// The program of the board that runs in QEMU.
+pub fn qemu_elf(root: &Path) -> Result<PathBuf> {
+    program_of(&root.join("firmware/boards").join(QEMU_BOARD))
+}
+
+/// The program of a board: each is named after its folder.
+fn program_of(board: &Path) -> Result<PathBuf> {
+    let built = board.join("target").join(target_of(board)?).join("release");
+    Ok(built.join(format!("gonia-{}", name_of(board))))
+}
+
+/// The target of a board, from its own settings of cargo.
+fn target_of(board: &Path) -> Result<String> {
+    let file = board.join(".cargo/config.toml");
+    let text = std::fs::read_to_string(&file).with_context(|| format!("{}", file.display()))?;
+    target_in(&text).with_context(|| {
+        let file = file.display();
+        format!("{file}: no target; write the chip's: [build] target = \"thumbv…\"")
+    })
+}
+
+fn target_in(settings: &str) -> Result<String> {
+    let settings: toml::Table = settings.parse()?;
+    let target = settings.get("build").and_then(|build| build.get("target"));
+    let target = target.and_then(|target| target.as_str());
+    Ok(target.context("[build] names no target")?.to_owned())
+}
+
+fn name_of(board: &Path) -> String {
+    let name = board.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_target_is_what_the_boards_own_settings_say() {
+        let settings = "[env]\ntarget = \"no\"\n[build]\ntarget = \"thumbv6m-none-eabi\"\n";
+        assert_eq!(target_in(settings).unwrap(), "thumbv6m-none-eabi");
+        assert!(target_in("[env]\ntarget = \"no\"\n").is_err());
+        assert!(target_in("[build]\ntarget = [\"a\"]\n").is_err());
+    }
+
+    #[test]
+    fn every_board_names_its_target() {
+        for board in folders(&root().unwrap()).unwrap() {
+            target_of(&board).unwrap();
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Windows and macOS: what can be known about them from here.
+
+use crate::table::Table;
+use crate::tools::{add_targets, cargo, run};
+use anyhow::Result;
+use std::path::Path;
+
+/// Windows, as it is built for.
+pub const WINDOWS: &str = "x86_64-pc-windows-gnu";
+const MACOS: &str = "aarch64-apple-darwin";
+
+/// Checks that everything compiles for the other systems, tests and benches too. Nothing is linked,
+/// so that no compiler of theirs is needed.
+pub fn check(table: &mut Table, root: &Path) -> Result<()> {
+    for target in [WINDOWS, MACOS] {
+        let name = format!("compiles for {target}");
+        if let Err(error) = add_targets(&[target.to_owned()]) {
+            table.not_run(&name, &format!("{error:#}"));
+            continue;
+        }
+        let arguments = ["check", "--workspace", "--all-targets", "--target", target];
+        table.step(&name, || run(cargo(root).args(arguments)))?;
+    }
+    Ok(())
+}
