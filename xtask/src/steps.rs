@@ -230,7 +230,7 @@ fn cargo(folder: &Path) -> Command {
     command
 }
 
-fn root() -> Result<PathBuf> {
+pub fn root() -> Result<PathBuf> {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .map(Path::to_path_buf)
