@@ -166,6 +166,24 @@ mod tests {
     }
 
     #[test]
+    fn a_step_is_run_left_out_or_an_error() {
+        let folder = std::env::temp_dir();
+        let of = |command, before| Step { command, before }.run(&folder, &folder);
+        let ran = of("cargo --version", Before::Nothing).unwrap().unwrap();
+        assert!(ran.stdout.starts_with("cargo "), "{}", ran.stdout);
+        assert!(ran.cost.wall_s > 0.0);
+        // The folder itself stands for a file that is there.
+        assert!(of("nobody", Before::SkipIf(".")).unwrap().is_none());
+        assert!(
+            of("cargo --version", Before::SkipIf("no/file"))
+                .unwrap()
+                .is_none()
+        );
+        assert!(of("cargo --no-such-option", Before::Nothing).is_err());
+        assert!(of("no-such-program", Before::Nothing).is_err());
+    }
+
+    #[test]
     fn a_step_names_its_environment_its_program_and_where_things_are() {
         let line = "ONE=1 TWO={root}/x program --out {work}/y";
         let command = command(line, Path::new("/r"), Path::new("/r/w")).unwrap();
