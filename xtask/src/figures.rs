@@ -69,10 +69,12 @@ fn named(names: &[String]) -> Result<Vec<&'static Figure>> {
 
 /// Makes figures one after the other. One that fails does not stop the others.
 fn make_all(root: &Path, figures: &[&Figure]) -> Result<()> {
+    let work = root.join(WORK);
+    Origin::now(root)?.clear_others(&work)?;
     let mut failed = Vec::new();
     for figure in figures {
         println!("== {}", figure.name);
-        if let Err(error) = make(root, figure) {
+        if let Err(error) = make(root, &work, figure) {
             eprintln!("{}: {error:#}", figure.name);
             failed.push(figure.name);
         }
@@ -83,20 +85,18 @@ fn make_all(root: &Path, figures: &[&Figure]) -> Result<()> {
     Ok(())
 }
 
-fn make(root: &Path, figure: &Figure) -> Result<()> {
-    let work = root.join(WORK);
+fn make(root: &Path, work: &Path, figure: &Figure) -> Result<()> {
     let origin = Origin::now(root)?;
-    origin.clear_others(&work)?;
     let start = Instant::now();
     let mut outputs = Vec::new();
     for step in figure.steps {
-        outputs.extend(step.run(root, &work)?);
+        outputs.extend(step.run(root, work)?);
     }
     if matches!(figure.take, Take::Written) {
         return Ok(());
     }
     let page = page_of(root, figure.name)?;
-    let body = figure.take.section(&outputs, &work)?;
+    let body = figure.take.section(&outputs, work)?;
     let commands: Vec<&str> = figure.steps.iter().map(|step| step.command).collect();
     let caption = origin.caption(start.elapsed().as_secs_f64(), &commands, WORK);
     let text = std::fs::read_to_string(&page)?;

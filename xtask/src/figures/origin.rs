@@ -5,6 +5,9 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// What follows the commit where files differ from it.
+const CHANGES: &str = " and changes";
+
 /// Where and of what something is measured.
 pub struct Origin {
     machine: String,
@@ -21,7 +24,7 @@ impl Origin {
         let status = [&["status", "--porcelain", "--"], &code[..]].concat();
         let mut commit = git(root, &log)?;
         if !git(root, &status)?.is_empty() {
-            commit += " and changes";
+            commit += CHANGES;
         }
         let now = SystemTime::now().duration_since(UNIX_EPOCH)?;
         Ok(Self {
@@ -31,10 +34,12 @@ impl Origin {
         })
     }
 
-    /// Empties the folder of what other commits have made, so that no figure stands on it.
+    /// Empties the folder of what other commits have made, and of what any changes have made, so that
+    /// no figure stands on it.
     pub fn clear_others(&self, work: &Path) -> Result<()> {
         let note = work.join("commit");
-        if std::fs::read_to_string(&note).is_ok_and(|commit| commit == self.commit) {
+        let of_this = std::fs::read_to_string(&note).is_ok_and(|commit| commit == self.commit);
+        if of_this && !self.commit.ends_with(CHANGES) {
             return Ok(());
         }
         if work.exists() {
@@ -159,6 +164,11 @@ mod tests {
         of("one").clear_others(&work).unwrap();
         assert!(made.exists());
         of("two").clear_others(&work).unwrap();
+        assert!(!made.exists());
+        let changed = of("two and changes");
+        changed.clear_others(&work).unwrap();
+        std::fs::write(&made, "").unwrap();
+        changed.clear_others(&work).unwrap();
         assert!(!made.exists());
         std::fs::remove_dir_all(&work).unwrap();
     }
