@@ -281,7 +281,7 @@ mod tests {
 
     use super::*;
 
-    /// What docs/boards.md calls the highest step rate.
+    /// What docs/src/guides/arms.md calls the highest step rate.
     const STEPS_S: u64 = 50_000;
     /// A control tick of 2 ms, and a main loop that is half a millisecond late every time.
     const LATE_TICK_US: u64 = 2_500;

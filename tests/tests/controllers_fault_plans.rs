@@ -82,14 +82,14 @@ fn print(seed: u64, plan: &FaultPlan, day: &Day) {
     let hours = day.virtual_us as f64 / 3.6e9;
     let faults = plan.events.len();
     let (kept, worst) = (day.kept, day.worst_deg);
-    print!("seed {seed}: {faults} faults, {hours:.2} h, {kept} kept, worst {worst:.4}°; ");
-    match &day.result {
-        Ok(s) => println!(
-            "complete, {} refused, {} retakes, {} recoveries, {} requests repeated",
+    let end = match &day.result {
+        Ok(s) => format!(
+            "complete; {} given up, {} retakes, {} recoveries, {} requests repeated",
             s.refused, s.retakes, s.recoveries, s.requests_repeated
         ),
-        Err(error) => println!("stopped: {error}"),
-    }
+        Err(error) => format!("stopped: {error}"),
+    };
+    println!("| {seed} | {faults} | {hours:.2} | {kept} | {worst:.4} | {end} |");
 }
 
 /// What happened to the arms shortly before the worst shot was triggered.
@@ -136,12 +136,13 @@ fn a_bad_day_comes_again_to_the_byte() {
     assert_ne!(first.trace, day(18, plan, &poses).trace);
 }
 
-/// Figures: `cargo test --release -p gonia-tests --test controllers_fault_plans -- --ignored
-/// --nocapture`.
+/// `cargo xtask figures fault-days` makes the book's table of it.
 #[test]
 #[ignore = "takes minutes; prints figures"]
 fn the_papers_plan_on_bad_days() {
     let poses = of_the_paper();
+    println!("| seed | faults | session, h | kept | largest true error, ° | end |");
+    println!("|---|---|---|---|---|---|");
     (101..=112u64).into_par_iter().for_each(|seed| {
         let plan = random_faults(seed, weather(poses.len(), 300, u32::from(seed % 4 == 0)));
         let day = day(seed, plan.clone(), &poses);

@@ -1,5 +1,5 @@
 //! The table of faults: each is let loose on a session of the real host and the real firmware core,
-//! what comes of it is compared with the row, and the rows are docs/faults.md.
+//! what comes of it is compared with the row, and the rows are docs/src/reference/faults.md.
 //!
 //! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-tests --test controllers_fault_table` writes the file;
 //! without it the test fails when the file says something else.
@@ -653,59 +653,13 @@ fn tear_a_save() -> End {
 // ---- the page ----
 
 const HEAD: &str = "\
-# Faults
-
-Written by `tests/tests/controllers_fault_table.rs`, which lets every fault loose on a session of 30
-poses of the real host and the real firmware core on the simulated rig, and fails when a row is not
-what happens. In every row no frame is kept whose arms were truly off by more than 0.03°.
-
-*Time to safe*: from the fault to the arm at rest with a latched fault, in virtual time, for this
-strike; – where nothing has to stop.
-
-## What no row can promise
-
-An encoder that shifts lies to every check that believes it; only the motor's steps and the home switch
-tell. On a calibrated axis steps and encoder, both counted from home and each a mean over the settle
-window, differ by what is left of the encoder's map (0.003°), by microsteps (0.0004°) and by what is left
-of the gear's map (0.0005°), both at home and at the pose: by 0.0045° when all is well. `steps_disagree`
-is 0.010° there. So a shift is found at the next rest for certain above 0.0145° and never below 0.0055°.
-At the home switch it is found above `home_tolerance`, 0.015°, and the 0.0025° by which the switch is
-overrun and the map may be off there: after homing that much may be left. A frame taken with an encoder
-so shifted is off by 0.0175°, the 0.006° of the deadband and 0.003° of the map: **0.0265°, within the
-limit whatever the shift**. `controllers_shifts` tries it: of 176 sessions with
-shifts of 0.004° to 0.046° the worst frame was off by 0.0206°, and none above 0.010° went unnoticed.
-
-Three things this does not cover. An axis that was *never* calibrated has a `steps_disagree` of 0.020°,
-because its gear and its ring take 0.015° of it: single frames may be off by 0.041°, and more by its
-eccentricity; a session says so when it begins. *Two* shifts of one encoder, with homing between them,
-may add up to 0.032° and frames to 0.041° until the next homing. And a worm wheel that is not regular
-to 0.0015° after its harmonic is taken off keeps its 0.020°; `calibrate` says so.
-
-The eccentricity of an encoder that was never calibrated is not seen where it is equal at home and at
-the target. Calibrate (see [boards.md](boards.md)); `gonia device PORT identify` says which axes are
-not, and a session says so when it begins.
-
-An arm that slips *after* it has arrived, while it waits for the other one, is seen by its encoder: no
-pulse is given outside `trigger_window` (0.012°). With a window of 0.03°, as it once was, whole sessions
-under random faults kept single frames at 0.0207° and 0.0262°: slips of 0.021° and 0.028°, 11.6 s and
-0.4 s before the pulse, which the encoder had read as 0.0206° and 0.0268° and the window had let pass.
-
-Collisions: the controllers know nothing of each other's arm, only of the chain that both share; so a
-bumper or light barrier between the arms belongs into it. The host knows both and refuses a pose whose
-directions are nearer than the keep-out angle (0 by default: the paper's arms pass at 1.1 m and 1.8 m).
-On the way from pose to pose the arms come no nearer either, whichever of the four axes is late: where
-they would, one waits for the other or goes round it by another elevation or the other turn of its
-azimuth; a pose that cannot be come to like that is given up. `gonia plan --keep-out DEG` tells beforehand.
-Homing and an arm that is pushed by hand are not watched: there the bumper is the guard.
-
-## The table
-
 | fault | the controller | code | the host | the session | time to safe |
 |---|---|---|---|---|---|
 ";
 
-fn page_of(rows: &[(Row, Seen)]) -> String {
-    let mut page = HEAD.to_owned();
+/// The page with its two tables made anew.
+fn page_of(page: &str, rows: &[(Row, Seen)]) -> String {
+    let mut table = HEAD.to_owned();
     for (row, seen) in rows {
         let codes: Vec<String> = seen.codes.iter().map(|code| code.0.to_string()).collect();
         let codes = if codes.is_empty() {
@@ -723,13 +677,13 @@ fn page_of(rows: &[(Row, Seen)]) -> String {
         let safe = seen.safe_s.map_or("–".to_owned(), |s| format!("{s:.2} s"));
         let (fault, does, host) = (row.fault, row.does, row.host);
         writeln!(
-            page,
+            table,
             "| {fault} | {does} | {codes} | {host} | {session} | {safe} |"
         )
         .unwrap();
     }
-    page.push_str("\n## Codes\n\nA number, once given, keeps its meaning for ever.\n\n");
-    page.push_str("| code | symptom | cause | cure | home is |\n|---|---|---|---|---|\n");
+    let mut codes =
+        "| code | symptom | cause | cure | home is |\n|---|---|---|---|---|\n".to_owned();
     for fault in FaultCode::PAGES {
         let home = if fault.code.loses_home() {
             "lost"
@@ -737,9 +691,17 @@ fn page_of(rows: &[(Row, Seen)]) -> String {
             "kept"
         };
         let (code, symptom, cause, cure) = (fault.code.0, fault.symptom, fault.cause, fault.cure);
-        writeln!(page, "| {code} | {symptom} | {cause} | {cure} | {home} |").unwrap();
+        writeln!(codes, "| {code} | {symptom} | {cause} | {cure} | {home} |").unwrap();
     }
-    page
+    with_rows(&with_rows(page, "rows", &table), "codes", &codes)
+}
+
+/// The page with these rows between two marks.
+fn with_rows(page: &str, mark: &str, rows: &str) -> String {
+    let (open, close) = (format!("<!-- {mark} -->\n"), format!("<!-- /{mark} -->"));
+    let (before, rest) = page.split_once(&open).unwrap();
+    let (_, after) = rest.split_once(&close).unwrap();
+    format!("{before}{open}{rows}{close}{after}")
 }
 
 #[test]
@@ -760,15 +722,15 @@ fn every_fault_ends_as_its_row_says_and_the_page_is_up_to_date() {
         wrong.join("\n")
     );
 
-    let page = page_of(&seen_rows);
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/faults.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/reference/faults.md");
+    let written = std::fs::read_to_string(&path).unwrap();
+    let page = page_of(&written, &seen_rows);
     if std::env::var_os("GONIA_UPDATE_DOCS").is_some() {
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, &page).unwrap();
+        return;
     }
-    let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == page,
-        "docs/faults.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
+        "docs/src/reference/faults.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
     );
 }

@@ -82,8 +82,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     assert_ne!(traces[0], traces[2]);
 }
 
-/// Figures for docs/results.md: `cargo test --release -p gonia-tests --test controllers_session --
-/// --ignored --nocapture`.
+/// `cargo xtask figures pointing` writes its figures into the book.
 #[test]
 #[ignore = "takes a minute; prints figures"]
 fn material_and_reference_of_the_papers_plan_are_measured() {

@@ -67,12 +67,18 @@ fn no_shift_of_an_encoder_carries_a_kept_frame_beyond_the_limit() {
     assert!(worst_deg <= POINTING_LIMIT_DEG, "{worst_deg}");
 }
 
-/// Figures: `cargo test -p gonia-tests --test controllers_shifts -- --ignored --nocapture`.
+/// `cargo xtask figures shifts` makes the book's table of it.
 #[test]
 #[ignore = "takes minutes; prints figures"]
 fn the_worst_of_many_shifts() {
     let shifts: Vec<f64> = (2..24).map(|i| f64::from(i) * 2e3).collect();
     let worst_deg = worst(&shifts, 0..8);
-    println!("worst of all: {worst_deg:.4}°");
+    println!("| sessions | shifts, ° | largest true error of a kept frame, ° |\n|---|---|---|");
+    println!(
+        "| {} | {} to {} | {worst_deg:.4} |",
+        8 * shifts.len(),
+        1e-6 * shifts[0],
+        1e-6 * shifts[shifts.len() - 1]
+    );
     assert!(worst_deg <= POINTING_LIMIT_DEG, "{worst_deg}");
 }

@@ -169,7 +169,7 @@ fn every_command_is_done_exactly_once_over_a_wire_that_bends_a_byte_in_a_hundred
     soak(1, 20_000);
 }
 
-/// Figures: `cargo test --release -p gonia-tests --test controllers_soak -- --ignored --nocapture`.
+/// `cargo xtask figures soak` writes its counters into the book.
 #[test]
 #[ignore = "a million commands take minutes; prints the counters"]
 fn a_million_commands_are_each_done_exactly_once() {

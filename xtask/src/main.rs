@@ -3,6 +3,7 @@
 mod boards;
 mod book;
 mod doors;
+mod figures;
 mod fuzz;
 mod imports;
 mod length;
@@ -25,11 +26,13 @@ cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/i
 cargo xtask size     flash and RAM of every board against its budget
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
 cargo xtask windows  run the demo under Wine: the same bytes as on Linux
-cargo xtask book     check the links of all pages and build the book in docs/book";
+cargo xtask book     check the links of all pages and build the book in docs/book
+cargo xtask figures [NAME]  measure a table of the book and write it; without NAME, list them";
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
     let outcome = match command.as_str() {
         "test" => steps::test(),
         "doors" => steps::doors(),
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         "fuzz" => steps::fuzz(),
         "windows" => windows::compare_with_linux(),
         "book" => book::book(),
+        "figures" => tools::root().and_then(|root| figures::figures(&root, &rest)),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

@@ -1,7 +1,7 @@
 //! Time of the two stages of one block: fitting (kernel matrix, factor, back substitution), and
 //! evaluation at the 256 cells of a pair of 8° patches. Best of many runs, on one thread.
 //!
-//! `cargo bench -p gonia-brdf --bench block`
+//! `cargo bench -p gonia-brdf --bench block` prints a table, a row for each number of data.
 
 use gonia_brdf::interpolate::block::{BlockSettings, BlockSolver};
 use gonia_brdf::interpolate::coordinates::Trend;
@@ -16,7 +16,7 @@ fn main() {
         nugget_min: 1e-4,
         trend: Trend::NONE,
     };
-    println!("nodes  fit us  evaluate 256 us");
+    println!("| data | fit, µs | evaluate 256 cells, µs |\n|---|---|---|");
     for n in [32, 64, 128, 256] {
         let nodes: Vec<Node> = (0..n).map(|k| node(k, 0.3)).collect();
         let places: Vec<[f32; 6]> = (0..256).map(|k| node(k, 0.1).point).collect();
@@ -32,7 +32,7 @@ fn main() {
             solver.evaluate(&places, &mut out);
             evaluate_us = evaluate_us.min(1e6 * start.elapsed().as_secs_f64());
         }
-        println!("{n:>5} {fit_us:>7.1} {evaluate_us:>16.1}");
+        println!("| {n} | {fit_us:.1} | {evaluate_us:.1} |");
     }
 }
 

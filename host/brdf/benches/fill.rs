@@ -1,5 +1,5 @@
-//! Interpolation of a whole plan's samples, against the analytic truth: time by stage, and
-//! RMS of ln(f/f_true) over missing cells.
+//! Interpolation of a whole plan's samples, against the analytic truth: time, and RMS of
+//! ln(f/f_true) over cells that are neither a bin nor a bin's mirror.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
 //! [--nodes 128] [--tolerance 1] [--budget 4] [--power 0.1] [--kernel 0.3] [--noise 0.015]
@@ -7,6 +7,10 @@
 //!
 //! The poses are the paper's 8505, every tenth of them, or the 925 of the quick demo.
 //! Without `--power` the coordinates are chosen; with it, these are taken.
+//!
+//! It prints a table, with the details of each row above it. CPU-s: sorting, choosing and filling.
+//! Interior: both θ ≤ 75°; grazing: one beyond, the other at most 78°; unmeasured: both beyond 78°.
+//! Seams: second differences of ln(f/f_true) across borders of blocks, and inside of them.
 
 #![allow(clippy::expect_used)]
 
@@ -36,14 +40,15 @@ fn main() {
     let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
     let noise = option("--noise", plan::NOISE);
     let named = |name: &str| arguments.iter().any(|a| a == name);
-    let poses = match (named("tenth"), named("quick")) {
-        (true, _) => Poses::tenth(),
-        (_, true) => Poses::quick(),
-        _ => Poses::paper(),
+    let (poses, how_many) = match (named("tenth"), named("quick")) {
+        (true, _) => (Poses::tenth(), "every tenth of 8505"),
+        (_, true) => (Poses::quick(), "925"),
+        _ => (Poses::paper(), "8505"),
     };
     println!(
-        "material   samples     bins  bin s  sort CPU-s  select CPU-s  fill CPU-s  fill s  interior grazing  all  void  settings"
+        "| material | preset | poses | CPU-s | interior | grazing | all | unmeasured | seams | inside |"
     );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     for name in plan::asked(&arguments) {
         let model = material(name);
         let samples = measure_with(&*model, noise, &poses);
@@ -52,11 +57,11 @@ fn main() {
         let bin_s = start.elapsed().as_secs_f64();
         let count = samples.len();
         drop(samples);
-        let preset = Preset::ALL
+        let named_preset = Preset::ALL
             .into_iter()
             .find(|p| arguments.iter().any(|a| a == p.name()))
-            .unwrap_or(Preset::Default)
-            .settings();
+            .unwrap_or(Preset::Default);
+        let preset = named_preset.settings();
         let base = Settings {
             block_deg: option("--block", preset.block_deg),
             tolerance: option("--tolerance", preset.tolerance.into()) as f32,
@@ -91,7 +96,6 @@ fn main() {
             errors(&known, &selection.settings, &*model);
         }
         let (across, inside) = bends(&dense, &selection.settings, &*model);
-        println!("  bends of the error: {across:.5} across borders of blocks, {inside:.5} inside");
         let mut measured = vec![false; grid.n_cells()];
         for bin in bins.bins() {
             let (i, v) = grid.light_and_view(bin.cell as usize);
@@ -101,13 +105,18 @@ fn main() {
         let rms =
             |keep: &(dyn Fn(f64, f64) -> bool + Sync)| log_rms(&dense, &*model, &measured, keep);
         println!(
-            "{name:<9} {count:>9} {:>8} {bin_s:>6.2} {sort_s:>11.1} {select_s:>13.1} {fill_cpu:>11.1} {fill_s:>7.1} {:>9.4} {:>7.4} {:>5.3} {:>5.3}  {}",
+            "  {count} samples in {} bins, binned in {bin_s:.2} s; {sort_s:.1} CPU-s to sort, {select_s:.1} to choose {}, {fill_cpu:.1} to fill in {fill_s:.1} s",
             bins.bins().len(),
+            selection.settings,
+        );
+        println!(
+            "| {name} | {} | {how_many} | {:.1} | {:.4} | {:.4} | {:.3} | {:.3} | {across:.4} | {inside:.4} |",
+            named_preset.name(),
+            sort_s + select_s + fill_cpu,
             rms(&|i, v| i <= 75.0 && v <= 75.0),
             rms(&|i, v| i.max(v) > 75.0 && i.min(v) <= 78.0),
             rms(&|_, _| true),
             rms(&|i, v| i > 78.0 && v > 78.0),
-            selection.settings,
         );
     }
 }

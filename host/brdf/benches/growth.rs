@@ -1,7 +1,7 @@
 //! Time and memory of binning and filling, against the number of samples, threads, and the grid's step.
 //!
-//! `cargo bench -p gonia-brdf --bench growth` runs each row in a process of its own, which tells its
-//! peak of memory from when the samples are there; `-- --fine` adds the grid of 1°, row by row and
+//! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
+//! peak of memory counts from when the samples are there. `-- --fine` adds the grid of 1°, row by row and
 //! without writing it (some three CPU-minutes).
 
 #![allow(clippy::expect_used)]
@@ -37,8 +37,9 @@ fn main() {
         return measure_row(number(1) as usize, number(2));
     }
     println!(
-        "  samples     bins  step  threads  binning  sorting, choosing   fill  all, CPU-s  wall, s  peak MB"
+        "| samples | bins | step | threads | binning, CPU-s | sorting and choosing, CPU-s | fill, CPU-s | all, CPU-s | wall, s | peak, MB |"
     );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     let fine = arguments.iter().any(|a| a == "--fine").then_some(FINE);
     for (samples, threads, step) in ROWS.into_iter().chain(fine) {
         let program = std::env::current_exe().expect("this program");
@@ -92,7 +93,7 @@ fn measure_row(samples: usize, step: f64) {
     }
     let filling = lap();
     println!(
-        "{count:>9} {:>8} {step:>4}° {:>8} {binning:>8.1} {choosing:>18.1} {filling:>6.1} {:>11.1} {:>8.1} {:>8.0}",
+        "| {count} | {} | {step}° | {} | {binning:.1} | {choosing:.1} | {filling:.1} | {:.1} | {:.1} | {:.0} |",
         bins.bins().len(),
         rayon::current_num_threads(),
         cpu_seconds() - first,

@@ -1,7 +1,6 @@
 //! Models fitted to noisy tables of themselves: their parameters come back.
 //!
-//! `cargo test --release -p gonia-brdf --test fit -- --ignored --nocapture` prints the table of
-//! docs/results.md, on the paper's grid.
+//! `cargo xtask figures fit` makes the book's table of them, on the paper's grid.
 #![allow(clippy::unwrap_used)]
 
 use gonia_brdf::direction::local_direction;
@@ -351,18 +350,28 @@ fn a_search_cut_short_says_so_and_keeps_what_it_has() {
 #[test]
 #[ignore = "a measurement: the paper's grid"]
 fn parameters_come_back_on_the_papers_grid() {
+    println!("| material | model | numbers | largest deviation, % | of | residual | wall, s |");
+    println!("|---|---|---|---|---|---|---|");
     for case in cases() {
         let (found, deviations, seconds) = run(&case, Grid::PAPER, &Settings::default());
         println!(
-            "{} ({}): residual {:.4}, {} steps, converged {}, {} of 4 starts agree, {seconds:.1} s",
+            "{} ({}): {} steps, converged {}, {} of 4 starts agree",
+            case.name, case.family, found.iterations, found.converged, found.agreeing_starts
+        );
+        let parameters = case.family.parameters();
+        let worst = (0..parameters.len())
+            .max_by(|a, b| deviations[*a].total_cmp(&deviations[*b]))
+            .unwrap();
+        println!(
+            "| {} | {} | {} | {:.2} | {} | {:.4} | {seconds:.1} |",
             case.name,
             case.family,
-            found.residual_rms,
-            found.iterations,
-            found.converged,
-            found.agreeing_starts
+            parameters.len(),
+            100.0 * deviations[worst],
+            parameters[worst].name,
+            found.residual_rms
         );
-        for (k, p) in case.family.parameters().iter().enumerate() {
+        for (k, p) in parameters.iter().enumerate() {
             println!(
                 "    {:<16} {:>9.4} true, {:>9.4} ± {} found, off by {:.2} %",
                 p.name,

@@ -207,31 +207,21 @@ fn map(out: &Path) {
             }
         }
     }
-    println!("  distance  bias %   rms %  over limit  direction max deg");
+    println!(
+        "| distance from the centre, mm | samples | bias, % | scatter, RMS, % | scatter over the limit | direction, largest error, ° |"
+    );
+    println!("|---|---|---|---|---|---|");
     let mut lines: [Vec<(f64, f64)>; 2] = Default::default();
     for (ring, errors) in rings.iter().enumerate() {
         let s = Summary::of(errors.iter());
         let distance = (ring as f64 + 0.5) * RING_MM;
-        println!(
-            "{distance:8.0}mm {:+7.3} {:7.3} {:11.3} {:10.4}",
-            100.0 * s.bias,
-            100.0 * s.rms,
-            s.over_limit,
-            s.direction_max_deg
-        );
+        println!("| {distance:.0} {}", s.cells());
         lines[0].push((distance, 100.0 * s.rms));
         lines[1].push((distance, 100.0 * s.bias));
     }
     all.extend(rings.into_iter().flatten());
     let s = Summary::of(all.iter());
-    println!(
-        "all {} samples: bias {:+.4} %, rms {:.3} %, {:.3} times the median's limit; direction at most {:.4} deg",
-        all.len(),
-        100.0 * s.bias,
-        100.0 * s.rms,
-        s.over_limit,
-        s.direction_max_deg
-    );
+    println!("| all {}", s.cells());
     let heat = |name, values: &[f64], signed| Heat {
         name,
         columns: &THETA_V,
@@ -265,6 +255,18 @@ struct Summary {
 }
 
 impl Summary {
+    /// The end of a table's row.
+    fn cells(&self) -> String {
+        format!(
+            "| {} | {:+.3} | {:.3} | {:.2} | {:.4} |",
+            self.samples,
+            100.0 * self.bias,
+            100.0 * self.rms,
+            self.over_limit,
+            self.direction_max_deg
+        )
+    }
+
     fn of<'a>(errors: impl Iterator<Item = &'a SampleError> + Clone) -> Self {
         let n = errors.clone().count();
         Self {
@@ -306,7 +308,10 @@ const POSES: [[f64; 4]; 5] = [
 ];
 
 fn cost(out: &Path) {
-    println!("   px  patch mm |   ms | noise rms %  bias %  | clean rms %");
+    println!(
+        "| px | patch, mm | register and sample, ms | scatter, % | bias, % | scatter without noise, % |"
+    );
+    println!("|---|---|---|---|---|---|");
     let mut csv = "px,patch_mm,register_ms,sample_ms,rms_percent,clean_rms_percent\n".to_owned();
     let mut series = Vec::new();
     for px in [256, 512, 1024, 2048] {
@@ -335,7 +340,7 @@ fn cost(out: &Path) {
             );
             let [register, sample] = [mean(&register), mean(&sample)];
             println!(
-                "{px:5} {patch:9.1} | {:4.1} | {:9.3} {:+8.3} | {:9.3}",
+                "| {px} | {patch} | {:.1} | {:.3} | {:+.3} | {:.3} |",
                 register + sample,
                 100.0 * n.rms,
                 100.0 * n.bias,
@@ -363,7 +368,10 @@ fn cost(out: &Path) {
 /// Hough is asked only when the lines are not where a trusted camera sees them: how often it leads
 /// to them, and for how long it is at it.
 fn hough() {
-    println!("bin, half widths | 512 px: ms, locked of 60 | 2048 px: ms, locked of 60");
+    println!(
+        "| bin, half widths of a line | 512 px: ms | locked of 60 | 2048 px: ms | locked of 60 |"
+    );
+    println!("|---|---|---|---|---|");
     for resolution in [0.25, 0.5, 1.0, 2.0, 4.0] {
         let mut cells = Vec::new();
         for px in [512, 2048] {
@@ -384,9 +392,9 @@ fn hough() {
                     }
                 }
             }
-            cells.push(format!("{:6.1}, {locked:2}", mean(&times)));
+            cells.push(format!("{:.1} | {locked}", mean(&times)));
         }
-        println!("{resolution:16} | {} | {}", cells[0], cells[1]);
+        println!("| {resolution} | {} | {} |", cells[0], cells[1]);
     }
 }
 

@@ -2,7 +2,8 @@
 //! the largest distance from each other, and poses chosen where the error bars are large
 //! (`gonia plan --adaptive`).
 //!
-//! `cargo bench -p gonia --bench adaptive [-- MATERIAL...] [--out DIR]` writes `adaptive.csv` and
+//! `cargo bench -p gonia --bench adaptive [-- MATERIAL...] [--out DIR]` prints a table (log RMS by
+//! stratum, mean cosine-weighted error, ΔE00 of a sphere), and writes it as `adaptive.csv` and
 //! `adaptive.svg`.
 
 #![allow(clippy::expect_used)]
@@ -45,6 +46,8 @@ fn main() {
         .map_or(".", |k| arguments[k + 1].as_str());
     let grid = Grid::with_step_deg(4.0).expect("a step");
     let mut csv = String::from("material,plan,poses,interior,grazing,highlight,cosine,sphere\n");
+    println!("| {} |", csv.trim_end().replace(',', " | "));
+    println!("|---|---|---|---|---|---|---|---|");
     let mut panels = Vec::new();
     for name in ["fabric", "sharp", "sharper"] {
         let any = ["fabric", "sharp", "sharper"].map(|n| arguments.iter().any(|a| a == n));
@@ -75,7 +78,7 @@ fn main() {
                 let fill = filled(&poses, &*model, grid);
                 let figures = judged(&fill.0, &*model);
                 let row = row(name, plan, poses.len(), &figures);
-                print!("{row}");
+                println!("| {} |", row.trim_end().replace(',', " | "));
                 csv += &row;
                 let interior = figures.stratum(Stratum::Interior).expect("cells");
                 points.push((poses.len() as f64, interior.log_rms));

@@ -1,7 +1,8 @@
 //! Milliseconds a frame and stage on one core: decoding, registration, sampling, occlusion.
 //!
-//! `cargo bench -p gonia --bench frames [-- PX...]`: CPU time of one thread, the median of several
-//! runs for each pose, then the mean over the poses (and the dearest pose).
+//! `cargo bench -p gonia --bench frames [-- PX...]` prints a table, a row for each side of the frame in
+//! pixels: CPU time of one thread, the median of several runs for each pose, then the mean over the
+//! poses (in brackets the slowest pose).
 
 #![allow(clippy::expect_used)]
 
@@ -38,8 +39,10 @@ fn main() {
     } else {
         asked
     };
-    println!("CPU ms a frame, mean over {} poses (dearest)", POSES.len());
-    println!("  px  Mpx |  decode |      register |        sample | both | occlusion | paper/all");
+    println!(
+        "| px | Mpx | decode | register | sample | both | occlusion | paper's 2.5 s over all |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for px in sizes {
         let rig = Rig::paper(px);
         let registrar = Registrar::new(&rig);
@@ -64,7 +67,7 @@ fn main() {
         let decode = decode_ms(px);
         let both = mean(&register) + mean(&sample);
         println!(
-            "{px:4} {:4.1} | {decode:7.1} | {:5.1} ({:5.1}) | {:5.1} ({:5.1}) | {both:4.1} | {:9.1} | {:5.0}",
+            "| {px} | {:.1} | {decode:.1} | {:.1} ({:.1}) | {:.1} ({:.1}) | {both:.1} | {:.1} | {:.0} |",
             (px * px) as f64 / 1e6,
             mean(&register),
             dearest(&register),

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Simulates both controllers, with their arms, until it is stopped with Ctrl-C.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does.\n\nWith --frames and --rig a camera stands beside them: it leaves a frame of the demo's fabric in the\nfolder for every trigger pulse, as [source] kind = \"folder\" wants them.\n\nBuilt with the feature genicam, --gige 127.0.0.1 and --rig make it a GigE Vision device at that address\ninstead, for [source] kind = \"genicam\": docs/cameras.md."
+    after_long_help = "Example:\n  gonia sim-device --pty &\n  gonia device /dev/pts/3 identify\n\nIt prints a line for each arm: its name and the port to open. Any baud rate does.\n\nWith --frames and --rig a camera stands beside them: it leaves a frame of the demo's fabric in the\nfolder for every trigger pulse, as [source] kind = \"folder\" wants them.\n\nBuilt with the feature genicam, --gige 127.0.0.1 and --rig make it a GigE Vision device at that address\ninstead, for [source] kind = \"genicam\": docs/src/guides/camera.md."
 )]
 pub struct SimDevice {
     /// Offer the controllers on pseudo-terminals (the default)

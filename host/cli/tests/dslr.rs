@@ -1,4 +1,4 @@
-//! The recipe for a DSLR (docs/dslr.sh), with stand-ins for gphoto2, dcraw and netpbm.
+//! The recipe for a DSLR (docs/src/guides/dslr.sh), with stand-ins for gphoto2, dcraw and netpbm.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -53,7 +53,7 @@ fn a_bracket_of_a_dslr_becomes_a_frame_and_a_camera_that_fails_gives_none() {
         read_noise_e: 4.0,
         bayer: None,
     });
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/dslr.sh");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guides/dslr.sh");
     let path = format!(
         "PATH={}:{}",
         folder.path().display(),

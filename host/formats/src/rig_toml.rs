@@ -5,7 +5,7 @@ use crate::{FileError, toml_text, write_whole_bytes};
 use gonia_rig::{Reference, Rig, check_rig};
 use std::path::Path;
 
-const REMEDY: &str = "docs/frames.md has the keys and their units";
+const REMEDY: &str = "docs/src/reference/files/rig.md has the keys and their units";
 
 /// Reads a rig and checks that it could exist.
 ///
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn the_documented_rig_is_the_papers() {
-        let page = include_str!("../../../docs/frames.md");
+        let page = include_str!("../../../docs/src/reference/files/rig.md");
         let (_, rest) = page.split_once("```toml\n").unwrap();
         let (text, _) = rest.split_once("```").unwrap();
         let mut paper = Rig::paper(1024);

@@ -1,5 +1,5 @@
 //! The table of what registration and sampling make of frames that are not as they should be. Each
-//! case is put before the real chain at eight views, and the rows are docs/vision.md.
+//! case is put before the real chain at eight views, and the rows are docs/src/explanation/frames.md.
 //!
 //! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-pipeline --test defective_frames` writes the file; without it the
 //! test fails when the file says something else.
@@ -539,7 +539,7 @@ same square. No frame can tell; the samples' azimuths are then off by 90°. Mark
 #[test]
 fn no_frame_is_locked_wrongly_and_the_table_says_what_becomes_of_it() {
     let (text, wrong) = document();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/vision.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/explanation/frames.md");
     assert!(wrong.is_empty(), "{wrong:#?}\n{text}");
     if std::env::var_os("GONIA_UPDATE_DOCS").is_some() {
         std::fs::write(&path, &text).unwrap();
@@ -547,6 +547,6 @@ fn no_frame_is_locked_wrongly_and_the_table_says_what_becomes_of_it() {
     let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == text,
-        "docs/vision.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
+        "docs/src/explanation/frames.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
     );
 }

@@ -62,7 +62,7 @@ impl Bench {
                 real(rig, ports, camera, orders)?
             }
             None => bail!(
-                "{}: has no [source]: say there where the frames come from (docs/session.md), or try --simulated",
+                "{}: has no [source]: say there where the frames come from (docs/src/reference/files/rig.md), or try --simulated",
                 path.display()
             ),
         };
@@ -117,7 +117,7 @@ fn genicam(rig: &Rig, setup: &Genicam, settings: &SessionSettings) -> Result<Box
 #[cfg(not(feature = "genicam"))]
 fn genicam(_: &Rig, _: &Genicam, _: &SessionSettings) -> Result<Box<dyn Camera>> {
     bail!(
-        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/cameras.md)"
+        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/src/guides/camera.md)"
     )
 }
 

@@ -29,7 +29,7 @@ use terminal::Terminal;
 /// Measures a material: every pose of the plan, its frame, its samples.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/session.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
+    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/src/guides/night.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
 )]
 pub struct Capture {
     /// Folder of the session

@@ -2,9 +2,9 @@
 2 degree grid from the same bins, and compares with the truth at these cells.
 
 The truth is a dense BRDF that `gonia query` reads, so that no EXR reader is needed; `--dense` lets a
-dense BRDF that `gonia fill` made compete at the same cells.
+dense BRDF that `gonia fill` made stand beside them, at the same cells. Prints a markdown table.
 
-    python bench/peers/peers.py samples.npy --truth truth.exr --gonia target/release/gonia \
+    python bench/baselines/baselines.py samples.npy --truth truth.exr --gonia target/release/gonia \
         --dense default=dense.exr --dense paper=paper.exr
 """
 
@@ -18,6 +18,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
@@ -100,7 +101,7 @@ def strata(cells, truth):
         "all": np.ones(len(cells), bool),
         "interior": (theta <= 75.0).all(axis=0),
         "grazing": (theta > 75.0).any(axis=0),
-        "void": (theta > 78.0).all(axis=0),
+        "unmeasured": (theta > 78.0).all(axis=0),
         "highlight": weighted >= np.quantile(weighted, 0.99),
         "retro": np.sum(i * v, axis=1) > np.cos(np.radians(8.0)),
     }
@@ -128,7 +129,7 @@ def knn16(points, values, at):
     return np.einsum("nk,nkc->nc", weight, values[found])
 
 
-PEERS = [
+BASELINES = [
     ("scipy linear, 200 neighbours", Rbf("linear"), False),
     ("scipy linear, mirrored samples", Rbf("linear"), True),
     ("scipy thin-plate, 200 neighbours", Rbf("thin_plate_spline"), False),
@@ -137,10 +138,14 @@ PEERS = [
 ]
 
 
-def report(name, value, truth, parts, floor, speed):
+def row(*columns):
+    print("| " + " | ".join(columns) + " |", flush=True)
+
+
+def report(material, name, value, truth, parts, floor, speed):
     log = np.log(np.maximum(value, floor) / np.maximum(truth, floor))
     columns = [np.sqrt(np.mean(log[inside] ** 2)) for inside in parts.values()]
-    print(f"{name:<34} {speed:>10}" + "".join(f" {rms:>9.4f}" for rms in columns), flush=True)
+    row(material, name, speed, *(f"{rms:.4f}" for rms in columns))
 
 
 def main():
@@ -151,7 +156,7 @@ def main():
     parser.add_argument("--cells", type=int, default=4000, help="missing cells to interpolate")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
-        "--dense", action="append", default=[], metavar="NAME=FILE.exr", help="a competitor"
+        "--dense", action="append", default=[], metavar="NAME=FILE.exr", help="a dense BRDF to judge too"
     )
     arguments = parser.parse_args()
 
@@ -162,7 +167,9 @@ def main():
     parts = strata(at, truth)
     share = len(at) / (N * N - len(cells))
     print(f"{len(cells)} bins; {len(at)} missing cells, {share:.1e} of them all; log RMS by stratum")
-    print(f"{'':<34} {'cells/s':>10}" + "".join(f" {name:>9}" for name in parts))
+    row("material", "method", "interpolations per core-s", *parts)
+    row(*["---"] * (3 + len(parts)))
+    material = Path(arguments.samples).stem
 
     d = directions()
     light, view = d[cells // N], d[cells % N]
@@ -172,7 +179,7 @@ def main():
     once = np.concatenate([np.ones(len(plain), bool), cells // N != cells % N])
     i, v = d[at // N], d[at % N]
     both = np.concatenate([np.concatenate([i, v], axis=1), np.concatenate([v, i], axis=1)])
-    for name, method, is_mirrored in PEERS:
+    for name, method, is_mirrored in BASELINES:
         points = mirrored[once] if is_mirrored else plain
         values = np.concatenate([medians, medians])[once] if is_mirrored else medians
         values = values.astype(np.float64)
@@ -184,15 +191,16 @@ def main():
         try:
             value = method(points, values, both)
         except np.linalg.LinAlgError as error:
-            print(f"{name:<34} {error}")
+            print(f"{name}: {error}")
             continue
         worked = time.process_time() - built - (built - start)
         speed = len(both) / max(worked, 1e-3)
-        report(name, 0.5 * (value[: len(at)] + value[len(at) :]), truth, parts, floor, f"{speed:.0f}")
-    for competitor in arguments.dense:
-        name, _, path = competitor.partition("=")
+        mean = 0.5 * (value[: len(at)] + value[len(at) :])
+        report(material, name, mean, truth, parts, floor, f"{speed:.0f}")
+    for dense in arguments.dense:
+        name, _, path = dense.partition("=")
         value = query(arguments.gonia, path, at)
-        report(f"gonia {name}", value, truth, parts, floor, "–")
+        report(material, f"gonia {name}", value, truth, parts, floor, "–")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Values of scipy's RBFInterpolator on a small set of bins, as the constants that
 host/brdf/src/cellwise/scipy_tests.rs is tested against.
 
-    python bench/peers/scipy_reference.py
+    python bench/baselines/scipy_reference.py
 """
 
 import numpy as np
