@@ -2,7 +2,7 @@
 
 use crate::table::Table;
 use crate::tools::{cargo, install, install_library, root, run};
-use crate::{boards, book, doors, fuzz, imports, length, links, systems};
+use crate::{boards, book, doors, figures, fuzz, imports, length, links, systems};
 use anyhow::{Result, bail};
 use std::path::Path;
 
@@ -53,6 +53,9 @@ fn check_doors(table: &mut Table, root: &Path) -> Result<()> {
 fn read_sources(table: &mut Table, root: &Path) -> Result<()> {
     check_doors(table, root)?;
     table.step("links", || links::check(root))?;
+    table.step("tables of the book", || {
+        figures::figures(root, &["--check".to_owned()])
+    })?;
     match book::installed(root) {
         Some(program) => table.step("book", || book::build(root, &program))?,
         None => table.not_run("book", "mdbook is missing: cargo xtask book installs it"),

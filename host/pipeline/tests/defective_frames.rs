@@ -119,6 +119,7 @@ fn stripes(at: f64, period: f64) -> f32 {
     }
 }
 
+// long: a table, one entry a case.
 fn cases() -> Vec<Case> {
     use Must::{BeBlind, NotMistake, Refuse, Use};
     let vignette: Change = |v, p, _, _| {

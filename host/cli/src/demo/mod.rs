@@ -9,15 +9,15 @@ use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_acquire::camera::SimulatedCamera;
 use gonia_acquire::capture::travelling;
-use gonia_brdf::DenseBrdf;
 use gonia_brdf::model::{Kurt, Material};
+use gonia_brdf::{DenseBrdf, Pose};
 use gonia_formats::dense_exr::write_dense;
 use gonia_formats::frames_csv::write_frames_csv;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::write_rig;
 use gonia_formats::samples::write_samples;
-use gonia_formats::{cell_mask, check_writable};
-use gonia_pipeline::process::{FrameSource, Masks};
+use gonia_formats::{Summary, cell_mask, check_writable};
+use gonia_pipeline::process::{FrameSource, Masks, Processed};
 use gonia_pipeline::provenance::of_this_program;
 use gonia_pipeline::{FillOptions, Options, Side, Table, compare, fill, samples_of};
 use gonia_plan::Rings;
@@ -26,6 +26,7 @@ use gonia_report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use gonia_report::{ReportInput, write_report, write_sphere};
 use gonia_rig::{CellMask, DenseFile, Rig, Scale};
 use gonia_sim::scene::{Scene, SceneGeometry};
+use session::Session;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -70,107 +71,149 @@ impl Demo {
         if !(100..=8192).contains(&frame_px) {
             bail!("--frame-px {frame_px}: must lie in 100..=8192");
         }
-        let keep_frames = self.keep_frames || self.quick;
-        let options = FillOptions::with_step_deg(step);
-        let (grid, _) = options.check()?;
         check_writable(&self.out)?;
-        let path = |name: &str| self.out.join(name);
-        let progress = Progress::new();
-
-        let rig = Rig::paper(frame_px);
-        write_rig(&path("rig.toml"), &rig)?;
-        let plan = travelling(&rings);
-        write_plan_csv(&path("plan.csv"), &plan.poses)?;
-
-        let material = Material::named(&self.material).context("--material")?;
-        let truth = material.brdf;
-        let mut camera = SimulatedCamera::new(Scene::new(
-            SceneGeometry::of_rig(&rig),
-            truth.clone(),
-            Arc::new(Kurt::white_reference_fabric()),
-            self.seed,
-        ));
-        if keep_frames {
-            camera.keep_frames(&self.out)?;
-        }
-        let session = progress.stage("moving and triggering", |tell| {
-            session::measure(&plan.poses, self.seed, &mut camera, tell)
-        })?;
-        if keep_frames {
-            write_frames_csv(&path("frames.csv"), camera.rows())?;
-        }
-
-        let processed = samples_of(&rig, &camera, &Masks::default(), &progress.watch())?;
-        progress.stage("writing samples", |_| {
-            write_samples(&path("samples.npy"), &processed.samples)
-        })?;
+        let run = Run {
+            material: Material::named(&self.material).context("--material")?,
+            rig: Rig::paper(frame_px),
+            poses: travelling(&rings).poses,
+            progress: Progress::new(),
+            demo: self,
+        };
+        let (session, processed) = run.measure()?;
         let frame_rows = account::describe(&processed);
-        let mut summary = summary::start(material.what, &session, &processed, plan.poses.len());
-        let filled = fill(processed.into_sample_set(), &options, &progress.watch())?;
-        summary.provenance.extend(filled.dense.provenance);
-        for (name, text) in [
-            ("material", material.name.to_owned()),
-            ("seed", self.seed.to_string()),
-            ("rig", format!("simulated, frames of {frame_px} px")),
-            ("plan", format!("{} poses", plan.poses.len())),
-        ] {
-            summary.provenance.insert(name.into(), text);
-        }
-
-        let measured = CellMask::from_cells(grid, filled.cells.iter().map(|c| *c as usize));
-        cell_mask::write_mask(&path(MEASURED), &measured)?;
-        summary::count_cells(&mut summary, filled.counts.binned as u64, &measured);
-        let dense = progress.stage("writing the dense BRDF", |_| {
-            write_dense(
-                &path(DENSE),
-                DenseFile {
-                    brdf: filled.dense.brdf,
-                    scale: summary.scale,
-                    provenance: summary.provenance.clone(),
-                },
-            )
-        })?;
-        summary.figures = Some(progress.stage("measuring the error", |_| {
-            compare(
-                Table::from(&dense),
-                Side::Model(truth.as_ref()),
-                &Options::default(),
-            )
-        })?);
-        progress.stage("writing the truth", |_| {
-            write_dense(
-                &path(TRUTH),
-                DenseFile {
-                    brdf: DenseBrdf::tabulate(grid, truth.as_ref()),
-                    scale: Scale::Absolute,
-                    provenance: of_this_program(),
-                },
-            )
-        })?;
-        summary.stages = progress.stages().to_vec();
-        summary::list_files(&mut summary, &self.out);
-        progress.stage("drawing the report", |_| {
-            let sphere = Tabulated::new(&dense.brdf);
-            write_sphere(&path("sphere.png"), &sphere, 512)?;
-            write_report(
-                &path(REPORT),
-                &ReportInput {
-                    truth: Some(truth.as_ref()),
-                    measured: Some(&measured),
-                    rig: Some(&rig),
-                    ..ReportInput::new(&summary, &dense.brdf)
-                },
-            )
-        })?;
-        summary.stages = progress.stages().to_vec();
-        summary::list_files(&mut summary, &self.out);
-        summary.write(&path(SUMMARY))?;
+        let (mut summary, dense, measured) = run.fill(step, &session, processed)?;
+        run.write_truth(&dense, &mut summary)?;
+        run.draw(&dense, &measured, &mut summary)?;
         summary::print(
             &summary,
             &session,
             &frame_rows,
             began.elapsed().as_secs_f64(),
         );
+        Ok(())
+    }
+}
+
+/// A demo under way.
+struct Run {
+    demo: Demo,
+    material: Material,
+    rig: Rig,
+    poses: Vec<Pose>,
+    progress: Progress,
+}
+
+impl Run {
+    fn path(&self, name: &str) -> PathBuf {
+        self.demo.out.join(name)
+    }
+
+    /// Moves the arms through the plan, and makes samples of the frames.
+    fn measure(&self) -> Result<(Session, Processed)> {
+        write_rig(&self.path("rig.toml"), &self.rig)?;
+        write_plan_csv(&self.path("plan.csv"), &self.poses)?;
+        let keep_frames = self.demo.keep_frames || self.demo.quick;
+        let mut camera = SimulatedCamera::new(Scene::new(
+            SceneGeometry::of_rig(&self.rig),
+            self.material.brdf.clone(),
+            Arc::new(Kurt::white_reference_fabric()),
+            self.demo.seed,
+        ));
+        if keep_frames {
+            camera.keep_frames(&self.demo.out)?;
+        }
+        let session = self.progress.stage("moving and triggering", |tell| {
+            session::measure(&self.poses, self.demo.seed, &mut camera, tell)
+        })?;
+        if keep_frames {
+            write_frames_csv(&self.path("frames.csv"), camera.rows())?;
+        }
+        let masks = Masks::default();
+        let processed = samples_of(&self.rig, &camera, &masks, &self.progress.watch())?;
+        self.progress.stage("writing samples", |_| {
+            write_samples(&self.path("samples.npy"), &processed.samples)
+        })?;
+        Ok((session, processed))
+    }
+
+    /// Interpolates the samples, and writes the dense BRDF and which cells were measured.
+    fn fill(
+        &self,
+        step_deg: f64,
+        session: &Session,
+        processed: Processed,
+    ) -> Result<(Summary, DenseFile, CellMask)> {
+        let mut summary = summary::start(self.material.what, session, &processed, self.poses.len());
+        let options = FillOptions::with_step_deg(step_deg);
+        let filled = fill(
+            processed.into_sample_set(),
+            &options,
+            &self.progress.watch(),
+        )?;
+        let mut file = filled.dense;
+        for (name, text) in [
+            ("material", self.material.name.to_owned()),
+            ("seed", self.demo.seed.to_string()),
+            (
+                "rig",
+                format!("simulated, frames of {} px", self.rig.camera.width_px),
+            ),
+            ("plan", format!("{} poses", self.poses.len())),
+        ] {
+            file.provenance.insert(name.into(), text);
+        }
+        summary.provenance = file.provenance.clone();
+        let cells = filled.cells.iter().map(|cell| *cell as usize);
+        let measured = CellMask::from_cells(file.brdf.grid(), cells);
+        cell_mask::write_mask(&self.path(MEASURED), &measured)?;
+        summary::count_cells(&mut summary, filled.counts.binned as u64, &measured);
+        let dense = self.progress.stage("writing the dense BRDF", |_| {
+            write_dense(&self.path(DENSE), file)
+        })?;
+        Ok((summary, dense, measured))
+    }
+
+    /// Compares the dense BRDF with the material's true one, and writes that too.
+    fn write_truth(&self, dense: &DenseFile, summary: &mut Summary) -> Result<()> {
+        let truth = self.material.brdf.as_ref();
+        summary.figures = Some(self.progress.stage("measuring the error", |_| {
+            compare(Table::from(dense), Side::Model(truth), &Options::default())
+        })?);
+        self.progress.stage("writing the truth", |_| {
+            write_dense(
+                &self.path(TRUTH),
+                DenseFile {
+                    brdf: DenseBrdf::tabulate(dense.brdf.grid(), truth),
+                    scale: Scale::Absolute,
+                    provenance: of_this_program(),
+                },
+            )
+        })?;
+        Ok(())
+    }
+
+    /// Draws the report and writes the summary.
+    fn draw(&self, dense: &DenseFile, measured: &CellMask, summary: &mut Summary) -> Result<()> {
+        let note = |summary: &mut Summary| {
+            summary.stages = self.progress.stages();
+            summary::list_files(summary, &self.demo.out);
+        };
+        note(summary);
+        self.progress.stage("drawing the report", |_| {
+            let sphere = Tabulated::new(&dense.brdf);
+            write_sphere(&self.path("sphere.png"), &sphere, 512)?;
+            write_report(
+                &self.path(REPORT),
+                &ReportInput {
+                    truth: Some(self.material.brdf.as_ref()),
+                    measured: Some(measured),
+                    rig: Some(&self.rig),
+                    ..ReportInput::new(summary, &dense.brdf)
+                },
+            )
+        })?;
+        note(summary);
+        summary.write(&self.path(SUMMARY))?;
         Ok(())
     }
 }

@@ -120,19 +120,7 @@ impl Judge {
                 judge.add(l, v, value(*cell), bits, only, &[(light, view, 1.0)]);
             }
         }
-        let mut ratios: Vec<f32> = bins
-            .bins()
-            .iter()
-            .step_by(bins.bins().len().div_ceil(SCAN_CELLS).max(1))
-            .filter(|bin| bin.light[2].min(bin.view[2]) > 0.26)
-            .flat_map(|bin| {
-                let at = |d: [f32; 3]| Direction::from_vec3(d.map(f64::from));
-                let truth = truth.brdf.lookup(at(bin.light), at(bin.view));
-                [0, 1, 2].map(|c| (truth[c] / bin.median[c]).ln())
-            })
-            .filter(|ratio| ratio.is_finite())
-            .collect();
-        judge.factor = f64::from(gonia_brdf::bins::median(&mut ratios)).exp();
+        judge.factor = factor_to(truth, bins);
         judge.draw_truth(truth);
         judge.finish(truth.scale)?;
         judge.basis = format!(
@@ -349,6 +337,23 @@ impl Judge {
         });
         (strata, sphere)
     }
+}
+
+/// The factor that brings bins to the truth: exp of the median of ln(truth/bin) in the interior.
+fn factor_to(truth: &DenseFile, bins: &Bins) -> f64 {
+    let mut ratios: Vec<f32> = bins
+        .bins()
+        .iter()
+        .step_by(bins.bins().len().div_ceil(SCAN_CELLS).max(1))
+        .filter(|bin| bin.light[2].min(bin.view[2]) > 0.26)
+        .flat_map(|bin| {
+            let at = |d: [f32; 3]| Direction::from_vec3(d.map(f64::from));
+            let truth = truth.brdf.lookup(at(bin.light), at(bin.view));
+            [0, 1, 2].map(|c| (truth[c] / bin.median[c]).ln())
+        })
+        .filter(|ratio| ratio.is_finite())
+        .collect();
+    f64::from(gonia_brdf::bins::median(&mut ratios)).exp()
 }
 
 fn draw(brdf: &dyn Brdf) -> Picture {
