@@ -76,7 +76,7 @@ fn main() {
                     poses.extend(propose(grid, &relative, &poses, more, &REACH).poses);
                 }
                 let fill = filled(&poses, &*model, grid);
-                let figures = judged(&fill.0, &*model);
+                let figures = compared(&fill.0, &*model);
                 let row = row(name, plan, poses.len(), &figures);
                 println!("| {} |", row.trim_end().replace(',', " | "));
                 csv += &row;
@@ -121,7 +121,7 @@ fn row(material: &str, plan: &str, poses: usize, figures: &Figures) -> String {
     row
 }
 
-fn judged(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
+fn compared(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
     let table = Table {
         brdf: dense,
         scale: Scale::Absolute,

@@ -1,7 +1,7 @@
 //! What came of the frames: rows of a command's table.
 
 use crate::table;
-use gonia_pipeline::process::{Compensation, Outcome, Processed};
+use gonia_pipeline::process::{Outcome, Processed, ReferenceCalibration};
 
 /// What came of the frames, for the table.
 pub fn describe(processed: &Processed) -> Vec<(String, String)> {
@@ -17,14 +17,14 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
         (
             "frames".to_owned(),
             format!(
-                "{} kept ({} of them by their pose, marks hidden), {} refused",
+                "{} kept ({} of them by their pose, lines hidden), {} refused",
                 table::count(counts.kept),
                 table::count(by_pose as u64),
                 table::count(counts.n_refused())
             ),
         ),
         (
-            "camera by the marks".into(),
+            "camera by the lines".into(),
             format!(
                 "theta {:+.4} ± {:.4}, phi {:+.4} ± {:.4} degrees from the arm's reading",
                 offsets.theta_mean_deg,
@@ -34,18 +34,24 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
             ),
         ),
         (
-            "compensation".into(),
-            match processed.compensation {
-                Compensation::KnownReference => "by the known reference, absolute (1/sr)",
-                Compensation::UnknownReference => "by the unknown reference, eq. (3), relative",
-                Compensation::GeometricModel => "none: ideal light over the geometry, relative",
+            "calibration".into(),
+            match processed.calibration {
+                ReferenceCalibration::KnownReference => {
+                    "against the known reference, absolute (1/sr)"
+                }
+                ReferenceCalibration::UnknownReference => {
+                    "against the unknown reference, eq. (3), relative"
+                }
+                ReferenceCalibration::GeometricModel => {
+                    "none: ideal light over the geometry, relative"
+                }
             }
             .to_owned(),
         ),
         (
             "samples".into(),
             format!(
-                "{}, and {} points left out ({} occluded, {} without light, {} at marks or the border, {} saturated, {} not finite)",
+                "{}, and {} points left out ({} occluded, {} without light, {} at lines or the border, {} saturated, {} not finite)",
                 table::count(processed.samples.len() as u64),
                 table::count(left_out.total()),
                 table::count(left_out.occlusion),

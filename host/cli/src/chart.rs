@@ -9,7 +9,7 @@ use gonia_formats::samples::read_samples;
 use gonia_formats::{check_writable, write_whole_bytes};
 use gonia_pipeline::chart;
 use gonia_pipeline::chart::{
-    Contender, HeldOut, Judge, Point, Subset, TestCounts, front, standard, to_csv,
+    Method, Point, Split, Subset, TestCounts, TestSet, front, standard, to_csv,
 };
 use gonia_report::frontier;
 use gonia_rig::Stratum;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// arms, one setting changed at a time (motion.svg, motion.csv, jerk.csv).
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia chart samples.npy --truth truth.exr --out chart\n  gonia chart --motion --out chart\n\nWithout --truth the error is that at whole frames held out (with their reciprocal ones), which\nneeds samples with frame numbers, and holds the noise of the samples too.\n\nCosts are CPU seconds. Methods that work cell by cell are timed on the cells of the tests alone;\nthe share is in the CSV."
+    after_long_help = "Example:\n  gonia chart samples.npy --truth truth.exr --out chart\n  gonia chart --motion --out chart\n\nWithout --truth the error is that at whole frames left out (with their reciprocal ones), which\nneeds samples with frame numbers, and holds the noise of the samples too.\n\nCosts are CPU seconds. Methods that work cell by cell are timed on the cells of the tests alone;\nthe share is in the CSV."
 )]
 pub struct Chart {
     /// Samples, .npy or .csv
@@ -42,12 +42,12 @@ pub struct Chart {
     /// Step of the grid in degrees
     #[arg(long, default_value_t = 2.0, value_name = "DEG")]
     step: f64,
-    /// Cells (or bins held out) that are tested
+    /// Cells (or bins left out) that are tested
     #[arg(long, default_value_t = 2000, value_name = "N")]
     tests: usize,
     /// Chart this method instead of the standard ones; again for more. Names are as in methods.csv
     #[arg(long = "method", value_name = "NAME")]
-    methods: Vec<Contender>,
+    methods: Vec<Method>,
     /// Leave out one of the two charts
     #[arg(long, value_enum, value_name = "CHART")]
     only: Option<Only>,
@@ -72,48 +72,48 @@ impl Chart {
         let progress = Progress::new();
         let samples = progress.stage("reading samples", |_| read_samples(path))?;
         check_writable(&self.out)?;
-        let (samples, judge) = self
-            .judge(samples, grid, &progress)
+        let (samples, tests) = self
+            .test_set(samples, grid, &progress)
             .with_context(|| path.display().to_string())?;
-        println!("judged by {}", judge.basis());
+        println!("compared with {}", tests.basis());
         if self.only != Some(Only::Images) {
             let bins = Bins::new(grid, &samples);
             let frames = Subset::all_of(&samples)[0].frames();
-            let contenders = self.contenders(grid);
+            let compared = self.compared(grid);
             let points = progress.stage("measuring methods", |tell| {
-                chart::methods(&bins, frames, &contenders, &judge, tell)
+                chart::methods(&bins, frames, &compared, &tests, tell)
             })?;
             print_points(&points);
             let title = title(path, "error against cost");
             self.write(
                 "methods",
                 &points,
-                &frontier::methods(&points, &title, judge.basis()),
+                &frontier::methods(&points, &title, tests.basis()),
             )?;
         }
         if self.only != Some(Only::Methods) {
-            let contenders = [Contender::default_of(grid), Contender::paper()];
+            let compared = [Method::default_of(grid), Method::paper()];
             let points = progress.stage("measuring fewer images", |tell| {
-                chart::images(&Subset::all_of(&samples), &contenders, &judge, tell)
+                chart::images(&Subset::all_of(&samples), &compared, &tests, tell)
             })?;
             print_points(&points);
             let title = title(path, "error against images");
             self.write(
                 "images",
                 &points,
-                &frontier::images(&points, &title, judge.basis()),
+                &frontier::images(&points, &title, tests.basis()),
             )?;
         }
         Ok(())
     }
 
-    /// The samples to interpolate, and what to judge by.
-    fn judge(
+    /// The samples to interpolate, and what they are compared with.
+    fn test_set(
         &self,
         samples: Vec<Sample>,
         grid: Grid,
         progress: &Progress,
-    ) -> Result<(Vec<Sample>, Judge)> {
+    ) -> Result<(Vec<Sample>, TestSet)> {
         let counts = TestCounts {
             spread: self.tests,
             highlights: self.tests / 4,
@@ -121,16 +121,16 @@ impl Chart {
         if let Some(path) = &self.truth {
             let truth = progress.stage("reading the truth", |_| read_dense(path))?;
             let bins = Bins::new(grid, &samples);
-            let judge = Judge::by_truth(&truth, &bins, counts)
+            let tests = TestSet::of_truth(&truth, &bins, counts)
                 .with_context(|| path.display().to_string())?;
-            return Ok((samples, judge));
+            return Ok((samples, tests));
         }
-        let held = HeldOut::new(samples)?;
-        let judge = Judge::by_held_out(&Bins::new(grid, &held.tests), counts)?;
-        Ok((held.training, judge))
+        let held = Split::new(samples)?;
+        let tests = TestSet::of_validation(&Bins::new(grid, &held.tests), counts)?;
+        Ok((held.training, tests))
     }
 
-    fn contenders(&self, grid: Grid) -> Vec<Contender> {
+    fn compared(&self, grid: Grid) -> Vec<Method> {
         if self.methods.is_empty() {
             return standard(grid);
         }

@@ -11,9 +11,9 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_long_help = "Example:\n  gonia compare dense.exr truth.exr --csv figures.csv")]
 pub struct Compare {
-    /// The dense BRDF to judge
+    /// The dense BRDF to compare
     a: PathBuf,
-    /// What it is judged by
+    /// What it is compared with
     b: PathBuf,
     /// Write the figures as CSV too
     #[arg(long, value_name = "FILE")]

@@ -40,7 +40,7 @@ pub struct Fill {
     /// Neighbours a block [default: the preset's]
     #[arg(long, value_name = "N")]
     nodes: Option<usize>,
-    /// Cut a block in finer ones where they differ by more than this many times the samples'
+    /// Refine a block where finer ones differ from it by more than this many times the samples'
     /// noise; 0 cuts all, inf none [default: the preset's, or more where cutting would cost too much]
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,

@@ -14,7 +14,7 @@ use gonia_rig::{DenseFile, Scale};
 use std::path::PathBuf;
 
 /// Brings a material of the UTIA database (.bin, anisotropic) or of MERL (.binary, isotropic) onto
-/// gonia's grid, so that every other command can judge, fit and draw it; one of Ngan, Durand and
+/// gonia's grid, so that every other command can compare, fit and draw it; one of Ngan, Durand and
 /// Matusik (.dat, anisotropic), which is full of holes, becomes samples for `gonia fill`.
 #[derive(clap::Args)]
 #[command(

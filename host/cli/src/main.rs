@@ -72,7 +72,7 @@ enum Command {
     Render(render::Render),
     /// A photograph of the material beside its render
     Photo(photo::Photo),
-    /// Other ways to the same BRDF, and how far each is from it
+    /// Baselines: other ways to the same BRDF, and how far each is from it
     Rivals(rivals::Rivals),
     /// Talk to the controller of an arm: identify, home, move, settings, calibration
     Device(device::Device),

@@ -135,7 +135,7 @@ impl Photo {
                 "correlation".into(),
                 format!("{:.4} of the luminances", likeness.correlation),
             ),
-            ("ΔE2000".into(), format!("mean {:.2}", likeness.delta_e)),
+            ("ΔE00".into(), format!("mean {:.2}", likeness.delta_e)),
         ]);
         if !likeness.is_cylinder() {
             eprintln!(

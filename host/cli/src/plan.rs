@@ -33,7 +33,7 @@ pub struct Plan {
     /// Where to write the poses (CSV); only a dry run without
     #[arg(short, long, value_name = "PLAN.csv")]
     output: Option<PathBuf>,
-    /// Rings of view directions, ELEVATION:COUNT in degrees
+    /// Rings of view directions, THETA:COUNT in degrees
     #[arg(long, value_name = "RINGS")]
     views: Option<RingList>,
     /// Rings of light directions
@@ -115,7 +115,7 @@ impl Plan {
     }
 }
 
-/// Refuses elevations beyond the controllers' default limits.
+/// Refuses polar angles beyond the controllers' default limits.
 fn check_limits(rings: &Rings) -> Result<()> {
     let limit_deg = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;
     for (name, list) in [("light", &rings.lights), ("view", &rings.views)] {

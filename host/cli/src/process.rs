@@ -10,7 +10,7 @@ use gonia_pipeline::process::{MASKS, Masks};
 use gonia_pipeline::samples_of;
 use std::path::PathBuf;
 
-/// Registers each frame from its marks, samples it, and compensates by the reference.
+/// Registers each frame by its fiducial lines, samples it, and calibrates it against the reference.
 #[derive(clap::Args)]
 #[command(
     after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig. Raw exposures\n(PNG of 8 or 16 bits: mono, Bayer or RGB) have an exposure_s as well; rows of one frame and role are\nmerged by the [sensor] of rig.toml."

@@ -59,7 +59,7 @@ impl Query {
             for (name, theta) in [("theta_i", theta_i), ("theta_v", theta_v)] {
                 if !(0.0..=90.0).contains(&theta) {
                     bail!(
-                        "standard input, line {line}: {name} = {theta} is not an elevation in 0..=90 degrees"
+                        "standard input, line {line}: {name} = {theta} is not a polar angle in 0..=90 degrees"
                     );
                 }
             }
@@ -77,7 +77,7 @@ impl Query {
         out.flush()?;
         if beyond > 0 {
             eprintln!(
-                "{beyond} directions lie above the grid's last elevation, {last_deg} degrees: they got its value"
+                "{beyond} directions lie above the grid's last polar angle, {last_deg} degrees: they got its value"
             );
         }
         Ok(())

@@ -22,7 +22,7 @@ pub struct Report {
     /// Write the paper's figures too, as PNG and SVG, into this folder
     #[arg(long, value_name = "FOLDER")]
     figures: Option<PathBuf>,
-    /// First make the rivals of the measurement, and compare them
+    /// First make the baselines of the measurement, and compare them
     #[arg(long)]
     rivals: bool,
 }

@@ -1,4 +1,4 @@
-//! `gonia rivals`: other ways to the same BRDF, from the same session.
+//! `gonia rivals`: the baselines of a measurement, from the same session.
 
 use crate::baselines::make_and_print;
 use anyhow::{Result, bail};
@@ -12,12 +12,12 @@ use std::path::PathBuf;
 /// around a cylinder, Kurt's model of two lobes and the microcylinder model.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr (those of the\npaper's method on a grid of 10 to 20 degrees).\n\n--step 4 makes and judges them on a grid of 4 degrees, which is a sixteenth of the disk. gonia's own\ninterpolation then has bins of 4 degrees; the paper's method has those of the session's grid."
+    after_long_help = "Example:\n  gonia rivals gonia-demo && gonia report gonia-demo\n\nReads DIR/dense.exr and DIR/samples.npy (with frame numbers); writes DIR/rivals.toml, the figure\nDIR/rivals.svg, and each BRDF as DIR/NAME.exr (those of the\npaper's method on a grid of 10 to 20 degrees).\n\n--step 4 makes and compares them on a grid of 4 degrees, which is a sixteenth of the disk. gonia's own\ninterpolation then has bins of 4 degrees; the paper's method has those of the session's grid."
 )]
 pub struct Rivals {
     /// The folder of a measurement
     folder: PathBuf,
-    /// Step of the rivals' grid in degrees, a multiple of the session's
+    /// Step of the baselines' grid in degrees, a multiple of the session's
     #[arg(long, value_name = "DEG")]
     step: Option<f64>,
     /// Leave out the paper's interpolation, the slowest

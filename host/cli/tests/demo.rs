@@ -39,7 +39,7 @@ fn the_quick_demo_measures_the_fabric_and_its_files_serve_every_command() {
         "{filled} bins filled, {expected} by the plan's geometry"
     );
 
-    // Measured runs had an interior log-RMS of 0.066 and 0.078 (which frames are held out decides
+    // Measured runs had an interior log-RMS of 0.066 and 0.078 (which frames cross-validation leaves out decides
     // between two nearly equal coordinates) and a sphere's ΔE of 0.63 and 0.76; the bounds leave
     // half as much again.
     let figures = summary.figures.as_ref().unwrap();

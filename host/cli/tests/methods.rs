@@ -112,12 +112,12 @@ fn charts_are_drawn_against_the_truth_and_against_frames_held_out() {
     let arguments = ["chart", text(&samples), "--only", "methods"];
     let out = ["--out", text(&without)];
     let said = gonia_ok(&[&arguments[..], &out, &common, &methods].concat(), "");
-    assert!(said.contains("bins of frames held out"), "{said}");
+    assert!(said.contains("bins of frames left out"), "{said}");
     assert!(!without.join("images.csv").exists());
 }
 
 #[test]
-fn a_chart_without_anything_to_judge_by_says_what_to_do() {
+fn a_chart_without_anything_to_compare_with_says_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
     data(dir.path());
     let csv = dir.path().join("few.csv");

@@ -24,7 +24,7 @@ pub(super) struct Cell {
     pub reciprocity_a: f32,
     /// The same of b.
     pub reciprocity_b: f32,
-    /// ΔE2000, for the share of cells where it is taken.
+    /// ΔE00, for the share of cells where it is taken.
     pub delta_e: Option<f32>,
 }
 

@@ -7,10 +7,10 @@
 //!   a millionth of the mean of its side, and is counted.
 //! * **cosine-weighted error**: |a − b|·cosθi·cosθv, its mean and its 99th percentile over cells
 //!   and channels, both as a share of the mean of b·cosθi·cosθv over the same cells and channels.
-//! * **ΔE2000** of π·f seen as a reflectance in linear sRGB; mean over a regular share of cells.
+//! * **ΔE00** of π·f seen as a reflectance in linear sRGB; mean over a regular share of cells.
 //!   Where `b` is relative both are brought to a mean luminance of 0.2 in the interior first.
 //! * **reciprocity residual**: root mean square of ln(f(i, v)/f(v, i)) of each side.
-//! * **rendered ΔE2000**: mean over the lit pixels of a sphere and a cylinder under the same
+//! * **rendered ΔE00**: mean over the lit pixels of a sphere and a cylinder under the same
 //!   lights and the same exposure, as a screen shows them (clipped at white).
 
 use crate::accumulate::{Cell, Sums};
@@ -40,7 +40,7 @@ impl<'a> From<&'a DenseFile> for Table<'a> {
     }
 }
 
-/// What a table is judged by.
+/// What a table is compared with.
 #[derive(Clone, Copy)]
 pub enum Side<'a> {
     /// Another table, of the same grid.
@@ -54,7 +54,7 @@ pub enum Side<'a> {
 pub struct Options<'a> {
     /// Name of the table.
     pub name_a: &'a str,
-    /// Name of what it is judged by.
+    /// Name of what it is compared with.
     pub name_b: &'a str,
     /// Cells to look at, numbered as by [`Grid::cell`]; all without it.
     pub only: Option<&'a (dyn Fn(usize) -> bool + Sync)>,
@@ -150,7 +150,7 @@ pub fn compare(a: Table<'_>, b: Side<'_>, options: &Options<'_>) -> Result<Figur
     })
 }
 
-/// Mean ΔE2000 over the pixels both pictures cover, at the exposure of the second.
+/// Mean ΔE00 over the pixels both pictures cover, at the exposure of the second.
 pub(super) fn picture_delta_e(a: &Picture, b: &Picture) -> f64 {
     let exposure = b.exposure(0.99, 0.9);
     let shown = |rgb: [f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));

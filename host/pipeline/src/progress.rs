@@ -53,7 +53,7 @@ impl fmt::Display for Step {
 }
 
 /// Called with a step and its share done: 0 once as it begins, then shares between 0 and 1 from any
-/// thread, and 1 once when it has ended well. Whoever returns [`ControlFlow::Break`] gets
+/// thread, and 1 once when it has ended well. A caller that returns [`ControlFlow::Break`] gets
 /// [`Error::Cancelled`](crate::Error::Cancelled) soon after.
 pub type Progress<'a> = dyn Fn(Step, f64) -> ControlFlow<()> + Sync + 'a;
 

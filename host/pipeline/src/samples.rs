@@ -98,7 +98,7 @@ fn watched(
 impl Processed {
     /// Whether the samples are in 1/sr.
     pub fn scale(&self) -> Scale {
-        if self.compensation.is_absolute() {
+        if self.calibration.is_absolute() {
             Scale::Absolute
         } else {
             Scale::Relative

@@ -176,7 +176,7 @@ fn a_known_reference_gives_absolute_values_within_the_noise() {
             ControlFlow::Continue(())
         })
         .unwrap();
-        assert_eq!(done.compensation, Compensation::KnownReference);
+        assert_eq!(done.calibration, ReferenceCalibration::KnownReference);
         assert_eq!(done.samples.len(), POSES.len() * 1225);
         assert_eq!(done.left_out, LeftOutCounts::default());
         for error in errors(&done, source.scene.material.as_ref()) {
@@ -210,7 +210,7 @@ fn without_a_reference_an_ideal_light_is_assumed() {
             ControlFlow::Continue(())
         })
         .unwrap();
-        assert_eq!(done.compensation, Compensation::GeometricModel);
+        assert_eq!(done.calibration, ReferenceCalibration::GeometricModel);
         for error in errors(&done, source.scene.material.as_ref()) {
             assert!(error.bias.abs() < 0.002, "{}: {}", error.frame, error.bias);
             assert!(error.scatter < 0.01, "{}: {}", error.frame, error.scatter);
@@ -238,7 +238,7 @@ fn an_unknown_reference_over_the_plan_gives_equation_3() {
         source.add(Role::Material, angles);
     }
     let done = source.run().unwrap();
-    assert_eq!(done.compensation, Compensation::UnknownReference);
+    assert_eq!(done.calibration, ReferenceCalibration::UnknownReference);
     assert!(done.reference.occluded > 0 && done.reference.mask_bytes > 0);
     assert!(done.reference.central > 500, "{:?}", done.reference);
     for error in errors(&done, source.scene.material.as_ref()) {
@@ -419,7 +419,7 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
         ControlFlow::Continue(())
     })
     .unwrap();
-    assert_eq!(done.compensation, Compensation::KnownReference);
+    assert_eq!(done.calibration, ReferenceCalibration::KnownReference);
     for (theta, factor) in [(30.0f32, 1.0f64), (75.0, 2.0)] {
         let truth = source.scene.material.as_ref();
         let near = |s: &&Sample| (s.theta_i_deg - theta).abs() < 2.0;

@@ -2,7 +2,7 @@
 //! front; and error against the number of images.
 
 use gonia_brdf::interpolate::Preset;
-use gonia_pipeline::chart::{Contender, Family, Point, front};
+use gonia_pipeline::chart::{Family, Method, Point, front};
 use gonia_render::svg;
 use gonia_rig::{Stratum, StratumFigures};
 use maud::{Markup, PreEscaped, html};
@@ -26,7 +26,7 @@ const PANELS: [(&str, Figure); 6] = [
     ("cosine-weighted relative error, all", |p| {
         of(p, Stratum::All, |f| f.cos_error_mean)
     }),
-    ("ΔE2000, rendered sphere", |p| p.sphere_delta_e),
+    ("ΔE00, rendered sphere", |p| p.sphere_delta_e),
 ];
 
 fn of(point: &Point, stratum: Stratum, figure: fn(&StratumFigures) -> f64) -> Option<f64> {
@@ -134,10 +134,10 @@ pub fn images(points: &[Point], title: &str, basis: &str) -> String {
 
 /// The preset that a method is.
 fn preset_of(name: &str) -> Option<Preset> {
-    let contender = |preset: &Preset| Contender::Blocks(preset.settings()).to_string();
+    let method = |preset: &Preset| Method::Blocks(preset.settings()).to_string();
     Preset::ALL
         .into_iter()
-        .find(|preset| contender(preset) == name)
+        .find(|preset| method(preset) == name)
 }
 
 /// A method's name in few letters: a preset's word, or the size of blocks, their nodes and tolerance.
@@ -435,7 +435,7 @@ mod tests {
     #[test]
     fn names_are_short_and_lie_neither_on_each_other_nor_on_points() {
         assert_eq!(label("blocks=8,nodes=64,tolerance=1"), "8°, 64, t=1");
-        let default = Contender::Blocks(Preset::Default.settings()).to_string();
+        let default = Method::Blocks(Preset::Default.settings()).to_string();
         assert_eq!(label(&default), "default");
         assert_eq!(label("paper"), "paper");
         // Four points of a front within a few pixels.

@@ -31,7 +31,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Measures a material of known BRDF, a two-thread fabric unless told, on the simulated rig.
+/// Measures a material of known BRDF, by default a two-thread fabric, on the simulated rig.
 #[derive(clap::Args)]
 #[command(
     after_long_help = "Example:\n  gonia demo --quick\n  gonia demo --material silk --out silk --frame-px 600\n\nThe whole plan has 8505 poses of the material and as many of the reference, and takes minutes;\n--quick has 925, a grid of 4 degrees, and keeps its frames, so that `gonia process` can be tried\non them."

@@ -53,13 +53,13 @@ fn capitalised(text: &str) -> String {
 }
 
 /// Adds the counts of bins and cells. Measured cells are those of the bins and their mirrors; cells
-/// both of whose elevations are beyond what any bin has in its lesser one are extrapolated.
+/// both of whose polar angles are beyond what any bin has in its lesser one are extrapolated.
 pub fn count_cells(summary: &mut Summary, binned: u64, bins: &CellMask) {
     summary.bins = Some(BinCounts::new(binned, bins));
     let grid = bins.grid();
     let reach = (0..grid.n_cells())
         .filter(|cell| bins.contains(*cell))
-        .map(|cell| lesser_elevation(grid, cell))
+        .map(|cell| lesser_ring(grid, cell))
         .max()
         .unwrap_or(0);
     let mut counts = CellCounts {
@@ -71,7 +71,7 @@ pub fn count_cells(summary: &mut Summary, binned: u64, bins: &CellMask) {
         let (light, view) = grid.light_and_view(cell);
         if bins.contains(cell) || bins.contains(grid.cell(view, light)) {
             counts.measured += 1;
-        } else if lesser_elevation(grid, cell) <= reach {
+        } else if lesser_ring(grid, cell) <= reach {
             counts.interpolated += 1;
         } else {
             counts.extrapolated += 1;
@@ -80,7 +80,7 @@ pub fn count_cells(summary: &mut Summary, binned: u64, bins: &CellMask) {
     summary.cells = Some(counts);
 }
 
-fn lesser_elevation(grid: Grid, cell: usize) -> usize {
+fn lesser_ring(grid: Grid, cell: usize) -> usize {
     let (light, view) = grid.light_and_view(cell);
     (light / grid.n_phi()).min(view / grid.n_phi())
 }

@@ -20,7 +20,7 @@ const NORMALS: usize = 41;
 const PIXEL_NOISE: f64 = 0.01 / PI;
 /// Standard deviation between strips.
 const STRIP_NOISE: f64 = 0.03;
-/// Elevations beyond this are not used.
+/// Polar angles beyond this are not used.
 const THETA_MAX_DEG: f64 = 86.0;
 
 /// Samples of a material (in 1/sr, or near it) as such a measurement would give them.

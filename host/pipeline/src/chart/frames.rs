@@ -1,23 +1,23 @@
-//! Which samples take part: frames held out to judge by, and subsets of frames.
+//! Which samples take part: frames for cross-validation, and subsets of frames.
 
 use gonia_brdf::direction::{Vec3, angle_between, normalize};
 use gonia_brdf::{Direction, Pose, Sample};
 use std::collections::HashMap;
 
-/// One frame in so many is held out.
+/// One frame in so many is left out for validation.
 const HOLD_OUT: u64 = 32;
 /// A frame whose light and view lie this near to a held-out frame's view and light measures the
 /// same by reciprocity, degrees; the plan's directions are 15° apart.
 const RECIPROCAL_DEG: f64 = 4.0;
 /// Sizes of the subsets of frames.
 const SUBSETS: [usize; 5] = [4000, 2000, 1000, 500, 250];
-/// Lights beyond this elevation are the plan's oblique ones, which sparse plans do without.
+/// Lights beyond this polar angle are the plan's oblique ones, which sparse plans do without.
 const OBLIQUE_DEG: f64 = 80.0;
 
 /// Why samples cannot be charted.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum ChartError {
-    /// Nothing to judge by.
+    /// Nothing to compare with.
     #[error(
         "only {0} frames are numbered, and at least 64 are needed to hold some out: \
          give samples with frame numbers, or the truth (--truth DENSE.exr)"
@@ -27,7 +27,7 @@ pub enum ChartError {
     #[error("its step is {0}°: chart on its own grid (--step {0})")]
     OtherGrid(String),
     /// A truth, or samples, without a positive value.
-    #[error("no test has a positive value to judge by: check the samples and the truth")]
+    #[error("no test has a positive value to compare with: check the samples and the truth")]
     NothingToJudge,
 }
 
@@ -91,15 +91,15 @@ fn hash(frame: u32) -> u64 {
     x ^ (x >> 29)
 }
 
-/// Samples in two parts: what is interpolated, and whole frames to judge it by.
-pub struct HeldOut {
+/// Samples in two parts: what is interpolated, and whole frames that it is validated with.
+pub struct Split {
     /// What is interpolated.
     pub training: Vec<Sample>,
     /// Frames that the training lacks, as it lacks their reciprocal ones.
     pub tests: Vec<Sample>,
 }
 
-impl HeldOut {
+impl Split {
     /// Holds out one frame in 32, with its reciprocal one, which is left out of both.
     ///
     /// # Errors
@@ -262,7 +262,7 @@ pub(super) mod tests {
 
     #[test]
     fn held_out_frames_and_their_reciprocals_are_missing_in_the_training() {
-        let held = HeldOut::new(samples(1)).unwrap();
+        let held = Split::new(samples(1)).unwrap();
         let (tests, training) = (frames_of(&held.tests), frames_of(&held.training));
         let share = 8505.0 / tests.len() as f64;
         assert!((26.0..40.0).contains(&share), "{share}");
@@ -279,7 +279,7 @@ pub(super) mod tests {
         let mut nameless = samples(1);
         nameless.iter_mut().for_each(|s| s.frame = Sample::NO_FRAME);
         assert_eq!(
-            HeldOut::new(nameless).err(),
+            Split::new(nameless).err(),
             Some(ChartError::TooFewFrames(0))
         );
     }

@@ -1,19 +1,19 @@
-//! What every interpolation method costs, and how far it is off: on one set of samples, judged by
-//! the truth or by frames held out.
+//! What every interpolation method costs, and how far it is off: on one set of samples, tested
+//! against the truth or by cross-validation, grouped by image.
 //!
-//! [`methods`] measures each [`Contender`] on the same cells; [`images`] measures a few of them on
+//! [`methods`] measures each [`Method`] on the same cells; [`images`] measures a few of them on
 //! fewer and fewer frames. `report::frontier` draws both.
 
-mod contender;
 mod cpu;
 mod frames;
-mod judge;
+mod method;
 mod table;
+mod test_set;
 
-pub use contender::{Contender, Family, standard};
-pub use frames::{ChartError, HeldOut, Subset, poses_of};
-pub use judge::{Judge, TestCounts};
+pub use frames::{ChartError, Split, Subset, poses_of};
+pub use method::{Family, Method, standard};
 pub use table::{front, to_csv};
+pub use test_set::{TestCounts, TestSet};
 
 use crate::Error;
 use gonia_brdf::Bins;
@@ -37,47 +37,47 @@ pub struct Point {
     pub share: f64,
     /// Interpolations that failed, as a share of those done.
     pub failed: f64,
-    /// Mean ΔE2000 over a sphere whose pixels take their nearest cells; `None` without a truth.
+    /// Mean ΔE00 over a sphere whose pixels take their nearest cells; `None` without a truth.
     pub sphere_delta_e: Option<f64>,
     /// Figures by part of the domain, of cells that are neither measured nor a measured one's
-    /// mirror (or of frames held out).
+    /// mirror (or of frames left out).
     pub strata: Vec<StratumFigures>,
 }
 
-/// Measures every contender on the same bins.
+/// Measures every method on the same bins.
 ///
 /// # Errors
 /// Too few bins.
 pub fn methods(
     bins: &Bins,
     frames: usize,
-    contenders: &[Contender],
-    judge: &Judge,
+    compared: &[Method],
+    tests: &TestSet,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Vec<Point>, Error> {
-    let mut points = Vec::with_capacity(contenders.len());
-    for (k, contender) in contenders.iter().enumerate() {
-        points.push(measure(bins, frames, contender, judge)?);
-        progress((k + 1) as f64 / contenders.len() as f64);
+    let mut points = Vec::with_capacity(compared.len());
+    for (k, method) in compared.iter().enumerate() {
+        points.push(measure(bins, frames, method, tests)?);
+        progress((k + 1) as f64 / compared.len() as f64);
     }
     Ok(points)
 }
 
-/// Measures contenders on subsets of the frames.
+/// Measures methods on subsets of the frames.
 ///
 /// # Errors
 /// Too few bins.
 pub fn images(
     subsets: &[Subset<'_>],
-    contenders: &[Contender],
-    judge: &Judge,
+    compared: &[Method],
+    tests: &TestSet,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Vec<Point>, Error> {
     let mut points = Vec::new();
     for (k, subset) in subsets.iter().enumerate() {
-        let bins = Bins::new(judge.grid(), &subset.samples());
-        for contender in contenders {
-            let mut point = measure(&bins, subset.frames(), contender, judge)?;
+        let bins = Bins::new(tests.grid(), &subset.samples());
+        for method in compared {
+            let mut point = measure(&bins, subset.frames(), method, tests)?;
             point.name = format!("{} from {}", point.name, subset.name());
             points.push(point);
         }
@@ -86,18 +86,13 @@ pub fn images(
     Ok(points)
 }
 
-fn measure(
-    bins: &Bins,
-    frames: usize,
-    contender: &Contender,
-    judge: &Judge,
-) -> Result<Point, Error> {
-    let run = contender.run(bins, judge.cells())?;
-    let (strata, sphere_delta_e) = judge.figures(&run.values);
+fn measure(bins: &Bins, frames: usize, method: &Method, tests: &TestSet) -> Result<Point, Error> {
+    let run = method.run(bins, tests.cells())?;
+    let (strata, sphere_delta_e) = tests.figures(&run.values);
     Ok(Point {
-        name: contender.to_string(),
-        family: contender.family(),
-        is_default: contender.is_default(bins.grid()),
+        name: method.to_string(),
+        family: method.family(),
+        is_default: method.is_default(bins.grid()),
         frames,
         core_s: run.core_s,
         share: run.share,

@@ -13,7 +13,7 @@ pub struct FrameReport {
     pub role: Role,
     /// Whether it was used, and on what ground.
     pub outcome: Outcome,
-    /// RMS distance of the marks' points from the fitted lines, pixels.
+    /// RMS distance of the fiducial lines' points from the fitted lines, pixels.
     pub residual_px: f64,
     /// Estimated true camera direction minus the reading.
     pub pose_offset: PoseOffset,
@@ -22,9 +22,9 @@ pub struct FrameReport {
 /// Whether and how a frame was used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// Registered by its marks.
+    /// Registered by its fiducial lines.
     Locked,
-    /// Used at the place its pose predicts, because too little of the marks can be seen.
+    /// Used at the place its pose predicts, because too little of the fiducial lines can be seen.
     FellBack(Reason),
     /// Not used.
     Refused(Refusal),
@@ -41,7 +41,7 @@ pub enum Refusal {
     NoReference,
 }
 
-/// Marks of which fewer than this many lines are seen do not even show that the frame is of the
+/// Fiducial lines of which fewer than this many are seen do not even show that the frame is of the
 /// target.
 const FEWEST_LINES: usize = 2;
 
@@ -119,7 +119,7 @@ impl AddAssign for LeftOutCounts {
 pub struct OffsetStatistics {
     /// Locked frames.
     pub frames: usize,
-    /// Mean offset of the camera's elevation, degrees.
+    /// Mean offset of the camera's polar angle, degrees.
     pub theta_mean_deg: f64,
     /// Its standard deviation, degrees.
     pub theta_sd_deg: f64,

@@ -7,7 +7,7 @@ use gonia_brdf::{Direction, Pose};
 const FEWEST_POSES: usize = 60;
 /// Widest hole between the reference's lights, or views, degrees.
 const WIDEST_HOLE_DEG: f64 = 40.0;
-/// Elevation up to which the hemisphere must be covered, degrees.
+/// Polar angle up to which the hemisphere must be covered, degrees.
 const COVERED_THETA_DEG: f64 = 60.0;
 /// Largest share of the material's frames that may be without a reference.
 const LARGEST_SHARE_MISSING: f64 = 0.1;
@@ -44,7 +44,7 @@ pub enum CoverageError {
         which: &'static str,
         /// Distance of the nearest.
         hole_deg: f64,
-        /// Elevation of the hole's middle.
+        /// Polar angle of the hole's middle.
         theta_deg: f64,
         /// Azimuth of the hole's middle.
         phi_deg: f64,

@@ -1,11 +1,11 @@
-//! From frames to samples: registration, occlusion, sampling, compensation by the reference.
+//! From frames to samples: registration, occlusion, sampling, calibration against the reference.
 //!
 //! Two passes over the frames, each parallel: first the reference's, of which only the values at
 //! the grid points are kept, then the material's, of which only the samples are.
 
 pub mod account;
+mod calibration;
 pub mod central;
-mod compensation;
 pub mod coverage;
 pub mod masks;
 mod reference;
@@ -14,13 +14,13 @@ pub mod sampled;
 pub mod source;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
-pub use compensation::Compensation;
+pub use calibration::ReferenceCalibration;
 pub use masks::{MASKS, Masks};
 pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
 pub use source::{FrameRow, FrameSource, Role};
 
 use crate::progress::Cancelled;
-use compensation::Compensator;
+use calibration::Calibrator;
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::{Direction, Sample};
 use gonia_formats::FileError;
@@ -46,8 +46,8 @@ pub enum Stage {
 pub struct Processed {
     /// The samples, in the order of the frames.
     pub samples: Vec<Sample>,
-    /// How the light was compensated for, and with it what unit the values have.
-    pub compensation: Compensation,
+    /// How the values were calibrated, and with it what unit they have.
+    pub calibration: ReferenceCalibration,
     /// Every frame, the reference's first.
     pub frames: Vec<FrameReport>,
     /// Points of used material frames that became no sample.
@@ -194,7 +194,7 @@ pub fn process_sampled(
         let refused = reference.len();
         return Err(ProcessError::ReferenceRefused { refused });
     }
-    let compensator = Compensator::new(
+    let calibrator = Calibrator::new(
         rig,
         bench.grid.centre(),
         References::new(references),
@@ -206,7 +206,7 @@ pub fn process_sampled(
         Stage::Material,
         &material,
         progress,
-        |row| bench.material(row, &compensator),
+        |row| bench.material(row, &calibrator),
         |(report, found, counts): (FrameReport, Vec<Sample>, LeftOutCounts)| {
             frames.push(report);
             samples.extend(found);
@@ -216,11 +216,11 @@ pub fn process_sampled(
     Ok(Processed {
         offsets: OffsetStatistics::of(&frames),
         samples,
-        compensation: compensator.kind(),
+        calibration: calibrator.kind(),
         frames,
         left_out,
-        reference: compensator.summary(),
-        masks: compensator.into_masks(),
+        reference: calibrator.summary(),
+        masks: calibrator.into_masks(),
     })
 }
 
@@ -300,9 +300,9 @@ impl Bench<'_> {
     fn material(
         &self,
         row: &FrameRow,
-        compensator: &Compensator,
+        calibrator: &Calibrator,
     ) -> Result<(FrameReport, Vec<Sample>, LeftOutCounts), ProcessError> {
-        let reference = compensator.reference_at(row.pose);
+        let reference = calibrator.reference_at(row.pose);
         // What hid the reference hid the material, and those points are left out already. Without
         // both, the material's own frame must tell.
         let hidden = match (reference, self.masks.at(row.pose)) {
@@ -317,7 +317,7 @@ impl Bench<'_> {
         if let Outcome::Refused(_) = report.outcome {
             return Ok((report, Vec::new(), counts));
         }
-        if reference.is_none() && compensator.needs_reference() {
+        if reference.is_none() && calibrator.needs_reference() {
             report.outcome = Outcome::Refused(Refusal::NoReference);
             return Ok((report, Vec::new(), counts));
         }
@@ -341,7 +341,7 @@ impl Bench<'_> {
             let (to_light, to_camera) = self.directions(row.pose.light, view, at);
             let relative = value.rgb.map(|v| v / irradiance as f32);
             let Some(rgb) =
-                compensator.value(relative, reference, i, (to_light, to_camera), &mut counts)
+                calibrator.value(relative, reference, i, (to_light, to_camera), &mut counts)
             else {
                 continue;
             };

@@ -23,7 +23,7 @@ pub struct SampledFrame {
     pub report: FrameReport,
     /// The arms' reading.
     pub reading: Pose,
-    /// The camera's direction as its marks tell it.
+    /// The camera's direction as its fiducial lines show it.
     pub view: Direction,
     /// In the order of the rig's grid; none when the frame was refused.
     pub points: Vec<Result<SampledPoint, LeftOut>>,
@@ -57,7 +57,7 @@ impl FrameSampler {
         }
     }
 
-    /// Registers a frame by its marks, and takes the value of every grid point.
+    /// Registers a frame by its fiducial lines, and takes the value of every grid point.
     pub fn sample(&self, frame: &Frame, row: &FrameRow, hidden: Hidden) -> SampledFrame {
         self.sample_registered(frame, row, hidden).0
     }

@@ -214,7 +214,7 @@ fn renders_and_photographs_are_drawn() {
         ],
         "",
     );
-    assert!(printed.contains("correlation") && printed.contains("ΔE2000"));
+    assert!(printed.contains("correlation") && printed.contains("ΔE00"));
     assert!(std::fs::metadata(&beside).unwrap().len() > 500);
 }
 
@@ -250,7 +250,7 @@ fn session(model: &dyn Brdf) -> Vec<Sample> {
 }
 
 #[test]
-fn rivals_are_made_judged_and_shown_in_the_report() {
+fn baselines_are_made_compared_and_shown_in_the_report() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let model = Kurt::white_reference_fabric();

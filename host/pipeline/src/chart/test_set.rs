@@ -1,4 +1,4 @@
-//! What the contenders are judged by, and the figures they get.
+//! What methods are tested with, and the figures they get.
 
 use crate::accumulate::{Cell, Sums};
 use crate::chart::frames::ChartError;
@@ -31,12 +31,12 @@ struct Test {
     view: Vec3,
     truth: [f32; 3],
     strata: StratumBits,
-    /// Cells by their number in [`Judge::cells`], with weights that sum to one.
+    /// Cells by their number in [`TestSet::cells`], with weights that sum to one.
     corners: Vec<(u32, f32)>,
 }
 
 /// Tests and a sphere.
-pub struct Judge {
+pub struct TestSet {
     grid: Grid,
     tests: Vec<Test>,
     cells: Vec<(u32, u32)>,
@@ -51,13 +51,13 @@ pub struct Judge {
     basis: String,
 }
 
-impl Judge {
-    /// Judges by a dense BRDF, at cells that have neither a bin nor a mirror with one. Samples have
+impl TestSet {
+    /// Tests against a dense BRDF, at cells that have neither a bin nor a mirror with one. Samples have
     /// no scale: they get the factor that brings the bins to the truth (median, interior).
     ///
     /// # Errors
     /// A truth of another grid, or without a positive value.
-    pub fn by_truth(
+    pub fn of_truth(
         truth: &DenseFile,
         bins: &Bins,
         counts: TestCounts,
@@ -102,7 +102,7 @@ impl Judge {
             .filter(is_missing)
             .take(counts.highlights)
             .collect();
-        let mut judge = Self::empty(grid);
+        let mut set = Self::empty(grid);
         for (cells, is_extra) in [(&spread_cells, false), (&bright, true)] {
             for cell in cells {
                 let (light, view) = grid.light_and_view(*cell);
@@ -117,27 +117,27 @@ impl Judge {
                     StratumBits::MAX
                 };
                 let (l, v) = (grid.direction(light), grid.direction(view));
-                judge.add(l, v, value(*cell), bits, only, &[(light, view, 1.0)]);
+                set.add(l, v, value(*cell), bits, only, &[(light, view, 1.0)]);
             }
         }
-        judge.factor = factor_to(truth, bins);
-        judge.draw_truth(truth);
-        judge.finish(truth.scale)?;
-        judge.basis = format!(
+        set.factor = factor_to(truth, bins);
+        set.draw_truth(truth);
+        set.finish(truth.scale)?;
+        set.basis = format!(
             "{} cells without a bin (and {} highlights), of {n}, against the truth; values times {:.4}",
             spread_cells.len(),
             bright.len(),
-            judge.factor
+            set.factor
         );
-        Ok(judge)
+        Ok(set)
     }
 
-    /// Judges by bins of frames that the contenders do not have. They lie between the nodes, so a
-    /// contender's value is what its table gives there: linear between the nodes, for all alike.
+    /// Tests against bins of frames that the methods do not have. They lie between the nodes, so a
+    /// method's value is what its table gives there: linear between the nodes, for all alike.
     ///
     /// # Errors
     /// No bin with a positive value.
-    pub fn by_held_out(bins: &Bins, counts: TestCounts) -> Result<Self, ChartError> {
+    pub fn of_validation(bins: &Bins, counts: TestCounts) -> Result<Self, ChartError> {
         let grid = bins.grid();
         let weighted = |bin: &gonia_brdf::Bin| {
             color::luminance(bin.median) * bin.light[2].max(0.0) * bin.view[2].max(0.0)
@@ -145,7 +145,7 @@ impl Judge {
         let mut all: Vec<f32> = bins.bins().iter().map(weighted).collect();
         let highlight = upper_percentile(&mut all);
         let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
-        let mut judge = Self::empty(grid);
+        let mut set = Self::empty(grid);
         let mut highlights_left = counts.highlights;
         let n = bins.bins().len();
         let chosen: HashSet<usize> = spread(n, counts.spread).collect();
@@ -175,14 +175,14 @@ impl Judge {
                 HIGHLIGHT
             };
             highlights_left -= usize::from(!is_spread);
-            judge.add(light, view, bin.median, bits, only, &corners);
+            set.add(light, view, bin.median, bits, only, &corners);
         }
-        judge.finish(Scale::Relative)?;
-        judge.basis = format!(
-            "{} bins of frames held out, at the directions measured, noise included",
-            judge.tests.len()
+        set.finish(Scale::Relative)?;
+        set.basis = format!(
+            "{} bins of frames left out (cross-validation), at the directions measured, noise included",
+            set.tests.len()
         );
-        Ok(judge)
+        Ok(set)
     }
 
     fn empty(grid: Grid) -> Self {
@@ -199,7 +199,7 @@ impl Judge {
         }
     }
 
-    /// The grid that is judged.
+    /// The grid of the cells.
     pub fn grid(&self) -> Grid {
         self.grid
     }
@@ -293,7 +293,7 @@ impl Judge {
         Ok(())
     }
 
-    /// Figures of the values of [`Judge::cells`], and the sphere's ΔE2000.
+    /// Figures of the values of [`TestSet::cells`], and the sphere's ΔE00.
     pub(super) fn figures(&self, values: &[[f32; 3]]) -> (Vec<StratumFigures>, Option<f64>) {
         let factor = self.factor as f32;
         let mut sums = Sums::default();

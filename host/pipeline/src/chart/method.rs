@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 /// A method with its settings.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Contender {
+pub enum Method {
     /// One cell at a time.
     Cellwise(CellSettings),
     /// Block by block, with these settings to begin with; the material's own are chosen.
@@ -112,15 +112,15 @@ const CELLWISE: [&str; 26] = [
 
 /// What is compared when nothing else is said: the default first, and no block smaller than a step
 /// of the grid.
-pub fn standard(grid: Grid) -> Vec<Contender> {
-    let default = Contender::default_of(grid);
-    let presets = Preset::ALL.map(|preset| Contender::blocks(preset.settings(), grid));
+pub fn standard(grid: Grid) -> Vec<Method> {
+    let default = Method::default_of(grid);
+    let presets = Preset::ALL.map(|preset| Method::blocks(preset.settings(), grid));
     let named = BLOCKS.iter().chain(&CELLWISE);
-    let named = named.filter_map(|name| name.parse::<Contender>().ok());
+    let named = named.filter_map(|name| name.parse::<Method>().ok());
     let others = presets.into_iter().chain(named);
-    let fits = |contender: &Contender| match contender {
-        Contender::Blocks(settings) => settings.block_deg >= 2.0 * grid.step_deg(),
-        Contender::Cellwise(_) => true,
+    let fits = |method: &Method| match method {
+        Method::Blocks(settings) => settings.block_deg >= 2.0 * grid.step_deg(),
+        Method::Cellwise(_) => true,
     };
     let mut all = vec![default];
     for other in others.filter(fits) {
@@ -131,7 +131,7 @@ pub fn standard(grid: Grid) -> Vec<Contender> {
     all
 }
 
-impl Contender {
+impl Method {
     /// What `gonia fill` does on a grid by itself.
     pub fn default_of(grid: Grid) -> Self {
         Self::blocks(Settings::DEFAULT, grid)
@@ -139,7 +139,7 @@ impl Contender {
 
     /// Blocks, of two steps of the grid at least.
     fn blocks(settings: Settings, grid: Grid) -> Self {
-        Contender::Blocks(Settings {
+        Method::Blocks(Settings {
             block_deg: settings.block_deg.max(2.0 * grid.step_deg()),
             ..settings
         })
@@ -147,10 +147,10 @@ impl Contender {
 
     /// The paper's method.
     pub fn paper() -> Self {
-        Contender::Cellwise(CellSettings::PAPER)
+        Method::Cellwise(CellSettings::PAPER)
     }
 
-    /// Whether it is [`Contender::default_of`].
+    /// Whether it is [`Method::default_of`].
     pub fn is_default(&self, grid: Grid) -> bool {
         *self == Self::default_of(grid)
     }
@@ -158,8 +158,8 @@ impl Contender {
     /// Its kind.
     pub fn family(&self) -> Family {
         match self {
-            Contender::Blocks(_) => Family::Blocks,
-            Contender::Cellwise(settings) => match settings.rule {
+            Method::Blocks(_) => Family::Blocks,
+            Method::Cellwise(settings) => match settings.rule {
                 Rule::Nearest | Rule::Shepard { .. } => Family::Distance,
                 Rule::MovingLeastSquares { .. } => Family::LeastSquares,
                 Rule::Rbf { kernel, .. } if kernel.name() == "linear" => Family::Linear,
@@ -171,8 +171,8 @@ impl Contender {
     /// Gives cells (a pair of direction indices each, poles at azimuth 0) their values.
     pub(super) fn run(&self, bins: &Bins, cells: &[(u32, u32)]) -> Result<Run, Error> {
         match self {
-            Contender::Cellwise(settings) => run_cellwise(bins, settings, cells),
-            Contender::Blocks(settings) => run_blocks(bins, settings, cells),
+            Method::Cellwise(settings) => run_cellwise(bins, settings, cells),
+            Method::Blocks(settings) => run_blocks(bins, settings, cells),
         }
     }
 }
@@ -214,11 +214,11 @@ fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run,
     })
 }
 
-impl fmt::Display for Contender {
+impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Contender::Cellwise(settings) => settings.fmt(f),
-            Contender::Blocks(settings) => {
+            Method::Cellwise(settings) => settings.fmt(f),
+            Method::Blocks(settings) => {
                 let Settings {
                     block_deg,
                     nodes,
@@ -240,7 +240,7 @@ impl fmt::Display for Contender {
     }
 }
 
-impl FromStr for Contender {
+impl FromStr for Method {
     type Err = SettingsError;
 
     /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
@@ -255,7 +255,7 @@ impl FromStr for Contender {
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
             let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
             let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
-            Some(Contender::Blocks(Settings {
+            Some(Method::Blocks(Settings {
                 block_deg,
                 nodes,
                 tolerance,
@@ -264,7 +264,7 @@ impl FromStr for Contender {
                 ..Settings::DEFAULT
             }))
         };
-        blocks().map_or_else(|| text.parse().map(Contender::Cellwise), Ok)
+        blocks().map_or_else(|| text.parse().map(Method::Cellwise), Ok)
     }
 }
 
@@ -281,8 +281,8 @@ mod tests {
             let mut names: Vec<String> = all.iter().map(|c| c.to_string()).collect();
             assert_eq!(names[names.len() - CELLWISE.len()], "paper");
             assert!(CELLWISE.iter().all(|name| names.contains(&(*name).into())));
-            for (name, contender) in names.iter().zip(&all) {
-                assert_eq!(name.parse().as_ref(), Ok(contender));
+            for (name, method) in names.iter().zip(&all) {
+                assert_eq!(name.parse().as_ref(), Ok(method));
             }
             names.sort();
             names.dedup();

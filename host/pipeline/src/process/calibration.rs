@@ -15,9 +15,9 @@ use gonia_brdf::{Pose, Vec3};
 use gonia_imaging::Mask;
 use gonia_rig::{FrameRow, Rig};
 
-/// How light and beam were compensated for.
+/// How light and beam were divided out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Compensation {
+pub enum ReferenceCalibration {
     /// By a reference of known reflectance: f = (I/I_R)·ρ/π, in 1/sr.
     KnownReference,
     /// By an unknown reference measured over the whole plan: eq. (3), relative to the irradiance
@@ -27,7 +27,7 @@ pub enum Compensation {
     GeometricModel,
 }
 
-impl Compensation {
+impl ReferenceCalibration {
     /// Whether values are in 1/sr.
     pub fn is_absolute(self) -> bool {
         self == Self::KnownReference
@@ -35,7 +35,7 @@ impl Compensation {
 }
 
 /// Compensates the samples of one session.
-pub struct Compensator {
+pub struct Calibrator {
     references: References,
     /// Number of poses in the central field.
     central: usize,
@@ -48,7 +48,7 @@ enum Method {
     Geometric,
 }
 
-impl Compensator {
+impl Calibrator {
     /// Chooses the method from what there is, and prepares it. `centre` is the index of the grid's
     /// middle point.
     pub fn new(
@@ -83,11 +83,11 @@ impl Compensator {
     }
 
     /// Which method it is.
-    pub fn kind(&self) -> Compensation {
+    pub fn kind(&self) -> ReferenceCalibration {
         match self.method {
-            Method::Known(_) => Compensation::KnownReference,
-            Method::Unknown(_) => Compensation::UnknownReference,
-            Method::Geometric => Compensation::GeometricModel,
+            Method::Known(_) => ReferenceCalibration::KnownReference,
+            Method::Unknown(_) => ReferenceCalibration::UnknownReference,
+            Method::Geometric => ReferenceCalibration::GeometricModel,
         }
     }
 
