@@ -1,4 +1,4 @@
-//! How many held-out bins, and how many true values, lie within their 95 % intervals.
+//! How many left-out bins, and how many true values, lie within their 95 % intervals.
 //!
 //! `cargo bench -p gonia-brdf --bench error_bars -- [MATERIAL …] [--sparse]`: the paper's plan on the
 //! 2° grid, or every tenth of its frames on 4°. It prints a table: percent in the interior, and in
@@ -9,18 +9,18 @@
 mod plan;
 
 use gonia_brdf::direction::Vec3;
-use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::cross_validation::Fold;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::refine::Refiner;
-use gonia_brdf::interpolate::{Calibration, Known, Origin, Settings, origins, select};
+use gonia_brdf::interpolate::{Calibration, Data, FillSettings, Origin, origins, select};
 use gonia_brdf::{Bins, Brdf, Grid};
-use plan::{NOISE, Poses, asked, cpu_seconds, material, measure_with};
+use plan::{NOISE, Poses, cpu_seconds, material, measure_with, named};
 
 /// Pairs of patches whose cells are looked at.
 const PAIRS: usize = 1000;
 /// Cells of each, about.
 const CELLS: usize = 40;
-/// Views end at this elevation, degrees.
+/// Views end at this polar angle, degrees.
 const GRAZING_DEG: f64 = 75.0;
 
 /// Shares of what lies within, in the interior and at grazing angles: how much of how much.
@@ -47,10 +47,10 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let sparse = arguments.iter().any(|a| a == "--sparse");
     println!(
-        "| material | held-out bins, % | interpolated cells, % | measured cells, % | calibration, CPU-s |"
+        "| material | left-out bins, % | interpolated cells, % | measured cells, % | calibration, CPU-s |"
     );
     println!("|---|---|---|---|---|");
-    for name in asked(&arguments) {
+    for name in named(&arguments) {
         let model = material(name);
         let (poses, step) = if sparse {
             (Poses::tenth(), 4.0)
@@ -61,23 +61,23 @@ fn main() {
         let samples = measure_with(&*model, NOISE, &poses);
         let bins = Bins::new(grid, &samples);
         drop(samples);
-        let known = Known::new(&bins);
-        let settings = select(&known, Settings::DEFAULT).settings;
+        let data = Data::new(&bins);
+        let settings = select(&data, FillSettings::DEFAULT).settings;
         let cpu = cpu_seconds();
-        let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
+        let calibration = Calibration::new(&data, &settings).expect("enough frames");
         let cpu = cpu_seconds() - cpu;
-        let held_out = held_out(&known, &settings, &calibration);
-        let [interpolated, measured] = truths(&known, &settings, &calibration, &*model);
-        println!("| {name} | {held_out} | {interpolated} | {measured} | {cpu:.1} |");
+        let left_out = left_out(&data, &settings, &calibration);
+        let [interpolated, measured] = truths(&data, &settings, &calibration, &*model);
+        println!("| {name} | {left_out} | {interpolated} | {measured} | {cpu:.1} |");
     }
 }
 
-/// Bins of other frames than those that the calibration held out.
-fn held_out(known: &Known, settings: &Settings, calibration: &Calibration) -> Shares {
+/// Bins of other frames than those that the calibration left out.
+fn left_out(data: &Data, settings: &FillSettings, calibration: &Calibration) -> Shares {
     let mut shares = Shares::default();
-    for set in 0..HoldOut::sets(known.bins()) {
-        let held_out = HoldOut::new(known.bins(), set, 24, 6000).expect("frames to hold out");
-        for p in held_out.predict(known, settings) {
+    for number in 0..Fold::usual_number(data.bins()) {
+        let fold = Fold::new(data.bins(), number, 24, 6000).expect("enough frames");
+        for p in fold.predict(data, settings) {
             let (light, view) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
             for is_within in calibration.covers(&p) {
                 shares.add(light, view, p.weight.into(), is_within);
@@ -90,23 +90,22 @@ fn held_out(known: &Known, settings: &Settings, calibration: &Calibration) -> Sh
 /// True values at cells of pairs of patches without a pattern: interpolated ones, and measured ones
 /// with their mirrors.
 fn truths(
-    known: &Known,
-    settings: &Settings,
+    data: &Data,
+    settings: &FillSettings,
     calibration: &Calibration,
     model: &dyn Brdf,
 ) -> [Shares; 2] {
-    let grid = known.bins().grid();
-    let origins = origins(known.bins());
-    let moved = known.moved(settings.coordinates);
-    let levels = moved.as_ref().unwrap_or(known.levels());
+    let grid = data.bins().grid();
+    let origins = origins(data.bins());
+    let moved = data.moved(settings.coordinates);
+    let hierarchy = moved.as_ref().unwrap_or(data.hierarchy());
     let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
-    let mut refiner = Refiner::default();
-    refiner.with_variances = true;
+    let mut refiner = Refiner::new(settings);
     let mut shares = [(); 2].map(|()| Shares::default());
     for k in 0..PAIRS {
         let (p, q) = (k * 7919 % patches.len(), k * 104_729 % patches.len());
         let (p, q) = (&patches[p], &patches[q]);
-        refiner.solve(levels, settings, p, q);
+        let solved = refiner.solve(hierarchy, settings, (p, q), true);
         let (rows, columns) = (p.vectors.len(), q.vectors.len());
         // Around the pole a pair has thousands of cells, with one error.
         for k in (0..rows * columns).step_by((rows * columns / CELLS).max(1)) {
@@ -116,8 +115,8 @@ fn truths(
             if origins[cell] == Origin::Extrapolated as u8 {
                 continue;
             }
-            let log = refiner.logs()[k];
-            let error = calibration.standard_error(light, view, log, refiner.variances()[k]);
+            let log = solved.cells[k];
+            let error = calibration.standard_error(light, view, log, solved.variances[k]);
             let truth = model.eval(light, view);
             let measured = origins[cell] <= Origin::Reciprocal as u8;
             for c in 0..3 {

@@ -2,11 +2,11 @@
 //! ln(f/f_true) over cells that are neither a bin nor a bin's mirror.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--nodes 128] [--tolerance 1] [--budget 4] [--power 0.1] [--kernel 0.3] [--noise 0.015]
+//! [--neighbours 128] [--tolerance 1] [--budget 4] [--exponent 0.1] [--kernel 0.3] [--noise 0.015]
 //! [tenth|quick]`
 //!
 //! The poses are the paper's 8505, every tenth of them, or the 925 of the quick demo.
-//! Without `--power` the coordinates are chosen; with it, these are taken.
+//! Without `--exponent` the coordinates are chosen; with it, these are taken.
 //!
 //! It prints a table, with the details of each row above it. CPU-s: sorting, choosing and filling.
 //! Interior: both θ ≤ 75°; grazing: one beyond, the other at most 78°; unmeasured: both beyond 78°.
@@ -16,116 +16,133 @@
 
 mod plan;
 
-use gonia_brdf::interpolate::hold_out::HoldOut;
+use gonia_brdf::interpolate::cross_validation::Fold;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{
-    Calibration, Known, Preset, Settings, fill, fill_with_errors, select,
+    Calibration, Data, FillSettings, Preset, fill, fill_with_errors, select,
 };
 use gonia_brdf::{Bins, Brdf, Grid};
 use plan::{Poses, cpu_seconds, material, measure_with};
 use rayon::prelude::*;
 use std::time::Instant;
 
+/// The command line.
+struct Arguments(Vec<String>);
+
+impl Arguments {
+    fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|a| a == name)
+    }
+
+    fn number(&self, name: &str, default: f64) -> f64 {
+        let place = self.0.iter().position(|a| a == name);
+        place.map_or(default, |k| self.0[k + 1].parse().expect("a number"))
+    }
+
+    fn preset(&self) -> Preset {
+        let preset = Preset::ALL.into_iter().find(|p| self.has(p.name()));
+        preset.unwrap_or(Preset::Default)
+    }
+
+    fn settings(&self) -> FillSettings {
+        let preset = self.preset().settings();
+        FillSettings {
+            block_deg: self.number("--block", preset.block_deg),
+            tolerance: self.number("--tolerance", preset.tolerance.into()) as f32,
+            budget: self.number("--budget", preset.budget.into()) as f32,
+            neighbours: self.number("--neighbours", preset.neighbours as f64) as usize,
+            range: self.number("--range", preset.range.into()) as f32,
+            nugget_min: self.number("--nugget", preset.nugget_min.into()) as f32,
+            ..preset
+        }
+    }
+}
+
 fn main() {
-    let arguments: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
-    let option = |name: &str, default: f64| {
-        arguments
-            .iter()
-            .position(|a| a == name)
-            .map_or(default, |k| arguments[k + 1].parse().expect("a number"))
-    };
-    let grid = Grid::with_step_deg(option("--step", 2.0)).expect("a grid step");
-    let noise = option("--noise", plan::NOISE);
-    let named = |name: &str| arguments.iter().any(|a| a == name);
-    let (poses, how_many) = match (named("tenth"), named("quick")) {
-        (true, _) => (Poses::tenth(), "every tenth of 8505"),
-        (_, true) => (Poses::quick(), "925"),
-        _ => (Poses::paper(), "8505"),
-    };
+    let arguments = Arguments(
+        std::env::args()
+            .skip(1)
+            .filter(|a| a != "--bench")
+            .collect(),
+    );
     println!(
         "| material | preset | poses | CPU-s | interior | grazing | all | unmeasured | seams | inside |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    for name in plan::asked(&arguments) {
-        let model = material(name);
-        let samples = measure_with(&*model, noise, &poses);
-        let start = Instant::now();
-        let bins = Bins::new(grid, &samples);
-        let bin_s = start.elapsed().as_secs_f64();
-        let count = samples.len();
-        drop(samples);
-        let named_preset = Preset::ALL
-            .into_iter()
-            .find(|p| arguments.iter().any(|a| a == p.name()))
-            .unwrap_or(Preset::Default);
-        let preset = named_preset.settings();
-        let base = Settings {
-            block_deg: option("--block", preset.block_deg),
-            tolerance: option("--tolerance", preset.tolerance.into()) as f32,
-            budget: option("--budget", preset.budget.into()) as f32,
-            nodes: option("--nodes", preset.nodes as f64) as usize,
-            range: option("--range", preset.range.into()) as f32,
-            nugget_min: option("--nugget", preset.nugget_min.into()) as f32,
-            ..preset
-        };
-        let cpu = cpu_seconds();
-        let known = Known::thinned(&bins, base.one_bin_in);
-        let sort_s = cpu_seconds() - cpu;
-        let cpu = cpu_seconds();
-        let mut selection = select(&known, base);
-        let select_s = cpu_seconds() - cpu;
-        for trial in &selection.trials {
-            println!(
-                "  tried {:<28} kernel w={:<4} log error {:.4}",
-                trial.settings.coordinates.to_string(),
-                trial.settings.kernel_weight,
-                trial.log_error
-            );
-        }
-        if arguments.iter().any(|a| a == "--power") {
-            selection.settings.coordinates.power = option("--power", 0.0);
-            selection.settings.kernel_weight = option("--kernel", 0.3);
-        }
-        let (cpu, start) = (cpu_seconds(), Instant::now());
-        let dense = fill(&known, &selection.settings, &|_| ()).expect("enough bins");
-        let (fill_cpu, fill_s) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
-        if arguments.iter().any(|a| a == "--errors") {
-            errors(&known, &selection.settings, &*model);
-        }
-        let (across, inside) = bends(&dense, &selection.settings, &*model);
-        let mut measured = vec![false; grid.n_cells()];
-        for bin in bins.bins() {
-            let (i, v) = grid.light_and_view(bin.cell as usize);
-            measured[grid.cell(i, v)] = true;
-            measured[grid.cell(v, i)] = true;
-        }
-        let rms =
-            |keep: &(dyn Fn(f64, f64) -> bool + Sync)| log_rms(&dense, &*model, &measured, keep);
-        println!(
-            "  {count} samples in {} bins, binned in {bin_s:.2} s; {sort_s:.1} CPU-s to sort, {select_s:.1} to choose {}, {fill_cpu:.1} to fill in {fill_s:.1} s",
-            bins.bins().len(),
-            selection.settings,
-        );
-        println!(
-            "| {name} | {} | {how_many} | {:.1} | {:.4} | {:.4} | {:.3} | {:.3} | {across:.4} | {inside:.4} |",
-            named_preset.name(),
-            sort_s + select_s + fill_cpu,
-            rms(&|i, v| i <= 75.0 && v <= 75.0),
-            rms(&|i, v| i.max(v) > 75.0 && i.min(v) <= 78.0),
-            rms(&|_, _| true),
-            rms(&|i, v| i > 78.0 && v > 78.0),
-        );
+    for name in plan::named(&arguments.0) {
+        run(name, &arguments);
     }
 }
 
+/// One material: its samples, bins, settings and fill.
+fn run(name: &str, arguments: &Arguments) {
+    let grid = Grid::with_step_deg(arguments.number("--step", 2.0)).expect("a grid step");
+    let (poses, how_many) = match (arguments.has("tenth"), arguments.has("quick")) {
+        (true, _) => (Poses::tenth(), "every tenth of 8505"),
+        (_, true) => (Poses::quick(), "925"),
+        _ => (Poses::paper(), "8505"),
+    };
+    let model = material(name);
+    let samples = measure_with(&*model, arguments.number("--noise", plan::NOISE), &poses);
+    let start = Instant::now();
+    let bins = Bins::new(grid, &samples);
+    let bin_s = start.elapsed().as_secs_f64();
+    let count = samples.len();
+    drop(samples);
+    let base = arguments.settings();
+    let cpu = cpu_seconds();
+    let data = Data::thinned(&bins, base.one_bin_in);
+    let sort_s = cpu_seconds() - cpu;
+    let cpu = cpu_seconds();
+    let selection = select(&data, base);
+    let select_s = cpu_seconds() - cpu;
+    for candidate in &selection.candidates {
+        println!(
+            "  candidate {:<28} kernel w={:<4} log error {:.4}",
+            candidate.settings.coordinates.to_string(),
+            candidate.settings.kernel_weight,
+            candidate.log_error
+        );
+    }
+    let mut settings = selection.settings;
+    if arguments.has("--exponent") {
+        settings.coordinates.exponent = arguments.number("--exponent", 0.0);
+        settings.kernel_weight = arguments.number("--kernel", 0.3);
+    }
+    let (cpu, start) = (cpu_seconds(), Instant::now());
+    let dense = fill(&data, &settings, &|_| ()).expect("enough bins");
+    let (fill_cpu, fill_s) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
+    if arguments.has("--errors") {
+        errors(&data, &settings, &*model);
+    }
+    let (across, inside) = bends(&dense, &settings, &*model);
+    let mut measured = vec![false; grid.n_cells()];
+    for bin in bins.bins() {
+        let (i, v) = grid.light_and_view(bin.cell as usize);
+        measured[grid.cell(i, v)] = true;
+        measured[grid.cell(v, i)] = true;
+    }
+    let rms = |keep: &(dyn Fn(f64, f64) -> bool + Sync)| log_rms(&dense, &*model, &measured, keep);
+    println!(
+        "  {count} samples in {} bins, binned in {bin_s:.2} s; {sort_s:.1} CPU-s to sort, {select_s:.1} to choose {settings}, {fill_cpu:.1} to fill in {fill_s:.1} s",
+        bins.bins().len(),
+    );
+    println!(
+        "| {name} | {} | {how_many} | {:.1} | {:.4} | {:.4} | {:.3} | {:.3} | {across:.4} | {inside:.4} |",
+        arguments.preset().name(),
+        sort_s + select_s + fill_cpu,
+        rms(&|i, v| i <= 75.0 && v <= 75.0),
+        rms(&|i, v| i.max(v) > 75.0 && i.min(v) <= 78.0),
+        rms(&|_, _| true),
+        rms(&|i, v| i > 78.0 && v > 78.0),
+    );
+}
+
 /// RMS of second differences of ln(f/f_true) between three neighbouring cells in a row, along the
-/// view's azimuth and elevation: where a border of two blocks lies among them, and inside of blocks.
+/// view's azimuth and polar angle: where a border of two blocks lies among them, and inside of blocks.
 /// More across means that seams show. Both θ ≤ 75°: beyond, one wild cell decides. Rows of cells
 /// count inside as often as across: near the pole azimuths lie close, and borders are few.
-fn bends(dense: &gonia_brdf::DenseBrdf, settings: &Settings, model: &dyn Brdf) -> (f64, f64) {
+fn bends(dense: &gonia_brdf::DenseBrdf, settings: &FillSettings, model: &dyn Brdf) -> (f64, f64) {
     let grid = dense.grid();
     let (n, n_phi) = (grid.n_directions(), grid.n_phi());
     let mut block = vec![0; n];
@@ -189,15 +206,15 @@ fn matched(rows: &[[(f64, f64); 2]]) -> (f64, f64) {
 }
 
 /// Error bars: time, and how many of the truths lie within the 95 % interval of their cell.
-fn errors(known: &Known, settings: &Settings, model: &dyn Brdf) {
+fn errors(data: &Data, settings: &FillSettings, model: &dyn Brdf) {
     let cpu = cpu_seconds();
-    let calibration = Calibration::new(known, settings).expect("enough frames");
+    let calibration = Calibration::new(data, settings).expect("enough frames");
     let calibrate_s = cpu_seconds() - cpu;
-    let (dense, bars) = fill_with_errors(known, settings, &calibration, &|_| ()).expect("bins");
+    let (dense, bars) = fill_with_errors(data, settings, &calibration, &|_| ()).expect("bins");
     let fill_s = cpu_seconds() - cpu - calibrate_s;
     println!("  error bars: calibration {calibrate_s:.1} CPU-s, fill {fill_s:.1} CPU-s");
-    let held_out = HoldOut::new(known.bins(), 3, 24, 8000).expect("enough frames");
-    let predictions = held_out.predict(known, settings);
+    let fold = Fold::new(data.bins(), 3, 24, 8000).expect("enough frames");
+    let predictions = fold.predict(data, settings);
     let share = |keep: &dyn Fn(f64, f64, f64) -> bool| {
         let (mut inside, mut all) = (0, 0);
         for p in &predictions {
@@ -219,13 +236,13 @@ fn errors(known: &Known, settings: &Settings, model: &dyn Brdf) {
     weighted.sort_by(f64::total_cmp);
     let bright = weighted[weighted.len() * 95 / 100];
     println!(
-        "  held-out bins within 95 %: all {:.1}, interior {:.1}, grazing {:.1}, brightest 5 % {:.1}",
+        "  left-out bins within 95 %: all {:.1}, interior {:.1}, grazing {:.1}, brightest 5 % {:.1}",
         share(&|_, _, _| true),
         share(&|i, v, _| i <= 75.0 && v <= 75.0),
         share(&|i, v, _| i > 75.0 || v > 75.0),
         share(&|_, _, w| w > bright),
     );
-    let grid = known.bins().grid();
+    let grid = data.bins().grid();
     let n = grid.n_directions();
     let mut count = [[0usize; 2]; 4];
     for light in (0..n).step_by(7) {

@@ -8,7 +8,7 @@
 
 mod plan;
 
-use gonia_brdf::interpolate::{ByRows, Known, Settings, fill, select};
+use gonia_brdf::interpolate::{ByRows, Data, FillSettings, fill, select};
 use gonia_brdf::{Bins, Grid};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
@@ -74,22 +74,22 @@ fn measure_row(samples: usize, step: f64) {
     let bins = Bins::new(grid, &all);
     drop(all);
     let binning = lap();
-    let known = Known::new(&bins);
-    let settings = Settings {
-        block_deg: Settings::DEFAULT.block_deg.max(2.0 * step),
-        ..Settings::DEFAULT
+    let data = Data::new(&bins);
+    let settings = FillSettings {
+        block_deg: FillSettings::DEFAULT.block_deg.max(2.0 * step),
+        ..FillSettings::DEFAULT
     };
-    let settings = select(&known, settings).settings;
+    let settings = select(&data, settings).settings;
     let choosing = lap();
     if grid.n_cells() > CELLS_IN_MEMORY {
-        let rows = ByRows::new(&known, &settings, &|_| ()).expect("enough bins");
+        let rows = ByRows::new(&data, &settings, &|_| ()).expect("enough bins");
         rows.each_row(&|_| (), &|_, row| match row[0][0] {
             value if value > 0.0 => Ok(()),
             value => Err(value),
         })
         .expect("positive values");
     } else {
-        drop(fill(&known, &settings, &|_| ()).expect("enough bins"));
+        drop(fill(&data, &settings, &|_| ()).expect("enough bins"));
     }
     let filling = lap();
     println!(

@@ -86,7 +86,7 @@ impl DenseBrdf {
     }
 
     /// The value at any pair of directions, linear between the nodes in all four angles; beyond
-    /// the last elevation the last node's value.
+    /// the last polar angle the last node's value.
     pub fn lookup(&self, light: Direction, view: Direction) -> [f32; 3] {
         let at = |i, v| Ok::<_, std::convert::Infallible>(self.at(i, v));
         match self.grid.lookup(light, view, at) {

@@ -6,7 +6,7 @@
 
 use crate::direction::{Direction, wrap_deg};
 
-/// Largest elevation of a node, in degrees (the paper's 86°).
+/// Largest polar angle of a node, in degrees (the paper's 86°).
 pub const THETA_MAX_DEG: f64 = 86.0;
 
 /// A lattice of directions with the same step in θ and φ, used for light and view alike.
@@ -59,7 +59,7 @@ impl Grid {
         self.step_mdeg as f64 / 1000.0
     }
 
-    /// Number of elevations.
+    /// Number of polar angles.
     pub fn n_theta(&self) -> usize {
         self.n_theta
     }
@@ -89,7 +89,7 @@ impl Grid {
     }
 
     /// The direction index of the node nearest to the angles, each axis rounded by itself; the
-    /// pole is index 0. `None` beyond half a step past the last elevation, and of an angle
+    /// pole is index 0. `None` beyond half a step past the last polar angle, and of an angle
     /// that is not finite.
     pub fn nearest(&self, theta_deg: f64, phi_deg: f64) -> Option<usize> {
         let step = self.step_deg();
@@ -109,7 +109,7 @@ impl Grid {
         Some(i_theta * self.n_phi + i_phi)
     }
 
-    /// The four nodes around a direction with their bilinear weights; beyond the last elevation
+    /// The four nodes around a direction with their bilinear weights; beyond the last polar angle
     /// those of its last ring.
     pub fn corners(&self, d: Direction) -> [(usize, f64); 4] {
         let (step, n_phi) = (self.step_deg(), self.n_phi);
@@ -128,7 +128,7 @@ impl Grid {
     }
 
     /// The value at any pair of directions, linear in all four angles between those that `at` gives for
-    /// pairs of direction indices; beyond the last elevation the last node's value.
+    /// pairs of direction indices; beyond the last polar angle the last node's value.
     pub fn lookup<E>(
         &self,
         light: Direction,

@@ -2,10 +2,10 @@
 
 use crate::direction::Direction;
 
-/// A ring of directions: elevation in degrees and number of equal azimuthal steps from φ = 0.
+/// A ring of directions: polar angle in degrees and number of equal azimuthal steps from φ = 0.
 pub type Ring = (f64, usize);
 
-/// The 81 directions of views and lights: rings of 15° in elevation.
+/// The 81 directions of views and lights: rings of 15° in polar angle.
 pub const UNIFORM_RINGS: [Ring; 6] = [
     (0.0, 1),
     (15.0, 6),

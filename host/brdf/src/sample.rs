@@ -1,14 +1,16 @@
 //! One measured sample.
 
+use crate::direction::Direction;
+
 /// A BRDF value seen at one grid point of one frame. Single-precision degrees, because ten million
 /// of these are kept at once and this is their form in files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Elevation of the light at the point, degrees.
+    /// Polar angle of the light at the point, degrees.
     pub theta_i_deg: f32,
     /// Azimuth of the light at the point, degrees in [0, 360).
     pub phi_i_deg: f32,
-    /// Elevation of the view at the point, degrees.
+    /// Polar angle of the view at the point, degrees.
     pub theta_v_deg: f32,
     /// Azimuth of the view at the point, degrees in [0, 360).
     pub phi_v_deg: f32,
@@ -21,4 +23,22 @@ pub struct Sample {
 impl Sample {
     /// Frame number of samples that came without one.
     pub const NO_FRAME: u32 = u32::MAX;
+
+    /// A value seen from `view` under a light from `light`, of no frame.
+    pub fn new(light: Direction, view: Direction, rgb: [f32; 3]) -> Self {
+        Self {
+            theta_i_deg: light.theta_deg() as f32,
+            phi_i_deg: light.phi_deg() as f32,
+            theta_v_deg: view.theta_deg() as f32,
+            phi_v_deg: view.phi_deg() as f32,
+            rgb,
+            frame: Self::NO_FRAME,
+        }
+    }
+
+    /// The same of a frame. Cross-validation and error bars group samples by their frames.
+    #[must_use]
+    pub fn in_frame(self, frame: u32) -> Self {
+        Self { frame, ..self }
+    }
 }

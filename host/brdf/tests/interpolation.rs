@@ -2,16 +2,17 @@
 
 use gonia_brdf::direction::{Vec3, local_direction};
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
-use gonia_brdf::interpolate::hold_out::HoldOut;
-use gonia_brdf::interpolate::levels::Levels;
-use gonia_brdf::interpolate::nodes::half_of_nodes;
+use gonia_brdf::interpolate::cross_validation::Fold;
+use gonia_brdf::interpolate::datum::half_of_data;
+use gonia_brdf::interpolate::hierarchy::Hierarchy;
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Known, Origin, Preset, Settings, fill, fill_with_errors, origins,
-    select,
+    Calibration, Coordinates, Data, FillSettings, Kernel, Origin, Preset, fill, fill_with_errors,
+    origins, select,
 };
 use gonia_brdf::model::{Brdf, Ggx, Kurt, KurtLobe, Ward};
+use gonia_brdf::random::Random;
 use gonia_brdf::{Bins, DenseBrdf, Direction, Grid, Sample};
 
 /// Standard deviation of the samples' noise, relative.
@@ -24,11 +25,7 @@ fn measure(model: &dyn Brdf) -> Vec<Sample> {
 
 fn measure_every(nth: usize, model: &dyn Brdf) -> Vec<Sample> {
     let (lights, views) = (paper_lights(), paper_views());
-    let mut state = 1u64;
-    let mut uniform = move || {
-        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-        (state >> 40) as f64 / (1u64 << 24) as f64
-    };
+    let mut random = Random::new(1);
     let mut samples = Vec::new();
     for frame in (0..lights.len() * views.len()).step_by(nth) {
         let (light, view) = (lights[frame / views.len()], views[frame % views.len()]);
@@ -37,20 +34,9 @@ fn measure_every(nth: usize, model: &dyn Brdf) -> Vec<Sample> {
             let l = local_direction(light, 1.1, point);
             let v = local_direction(view, 1.8, point);
             let value = model.eval(l, v);
-            // Nearly normal: the sum of four uniform numbers.
-            let rgb = value.map(|value| {
-                let sum: f64 = (0..4).map(|_| uniform()).sum();
-                (value * (1.0 + NOISE * (sum - 2.0) * 3f64.sqrt())) as f32
-            });
+            let rgb = value.map(|value| (value * (1.0 + NOISE * random.normal())) as f32);
             let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-            samples.push(Sample {
-                theta_i_deg: l.theta_deg() as f32,
-                phi_i_deg: l.phi_deg() as f32,
-                theta_v_deg: v.theta_deg() as f32,
-                phi_v_deg: v.phi_deg() as f32,
-                rgb,
-                frame: frame as u32,
-            });
+            samples.push(Sample::new(l, v, rgb).in_frame(frame as u32));
         }
     }
     samples
@@ -76,21 +62,21 @@ fn angles(bin_light: [f32; 3], bin_view: [f32; 3]) -> (f64, f64) {
 }
 
 #[test]
-fn held_out_bins_lie_within_their_error_bars() {
+fn left_out_bins_lie_within_their_error_bars() {
     let grid = Grid::with_step_deg(4.0).unwrap();
     for model in [broad(), Kurt::two_thread_fabric()] {
         let bins = Bins::new(grid, &measure(&model));
-        let known = Known::new(&bins);
-        let settings = Settings {
+        let data = Data::new(&bins);
+        let settings = FillSettings {
             noise_variance: (NOISE * NOISE) as f32,
-            ..Settings::DEFAULT
+            ..FillSettings::DEFAULT
         };
-        let calibration = Calibration::new(&known, &settings).unwrap();
-        // Other frames than those that the calibration held out.
+        let calibration = Calibration::new(&data, &settings).unwrap();
+        // Other frames than those that the calibration left out.
         let mut shares = [[0.0f32; 2]; 4];
-        for set in 0..4 {
-            let held_out = HoldOut::new(&bins, set, 24, 4000).unwrap();
-            let predictions = held_out.predict(&known, &settings);
+        for number in 0..4 {
+            let fold = Fold::new(&bins, number, 24, 4000).unwrap();
+            let predictions = fold.predict(&data, &settings);
             let mut bright: Vec<f32> = predictions.iter().map(|p| p.bin.median[1]).collect();
             bright.sort_by(f32::total_cmp);
             let bright = bright[bright.len() * 9 / 10];
@@ -150,14 +136,13 @@ fn true_values_lie_within_the_error_bars_of_their_cells() {
     ];
     for (number, model) in models.into_iter().chain(others()).enumerate() {
         let bins = Bins::new(grid, &measure_every(10, &*model));
-        let known = Known::new(&bins);
-        let settings = select(&known, Settings::DEFAULT).settings;
-        let calibration = Calibration::new(&known, &settings).unwrap();
-        let moved = known.moved(settings.coordinates);
-        let levels = moved.as_ref().unwrap_or(known.levels());
+        let data = Data::new(&bins);
+        let settings = select(&data, FillSettings::DEFAULT).settings;
+        let calibration = Calibration::new(&data, &settings).unwrap();
+        let moved = data.moved(settings.coordinates);
+        let hierarchy = moved.as_ref().unwrap_or(data.hierarchy());
         let origins = origins(&bins);
-        let mut refiner = Refiner::default();
-        refiner.with_variances = true;
+        let mut refiner = Refiner::new(&settings);
         let mut shares = [[0.0f64; 2]; 4];
         // Pairs without a pattern.
         for k in 0..800 {
@@ -165,7 +150,7 @@ fn true_values_lie_within_the_error_bars_of_their_cells() {
                 &patches[k * 7919 % patches.len()],
                 &patches[k * 104_729 % patches.len()],
             );
-            refiner.solve(levels, &settings, p, q);
+            let solved = refiner.solve(hierarchy, &settings, (p, q), true);
             let (rows, columns) = (p.vectors.len(), q.vectors.len());
             // Around the pole a pair has thousands of cells, with one error.
             for k in (0..rows * columns).step_by((rows * columns / 16).max(1)) {
@@ -175,7 +160,7 @@ fn true_values_lie_within_the_error_bars_of_their_cells() {
                     continue;
                 }
                 let (light, view) = (p.vectors[a], q.vectors[b]);
-                let (log, variance) = (refiner.logs()[k], refiner.variances()[k]);
+                let (log, variance) = (solved.cells[k], solved.variances[k]);
                 let error = calibration.standard_error(light, view, log, variance);
                 let truth = model.eval(light, view);
                 let is_grazing = light[2].min(view[2]) < 75f64.to_radians().cos();
@@ -203,14 +188,14 @@ fn true_values_lie_within_the_error_bars_of_their_cells() {
 fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
     let grid = Grid::with_step_deg(6.0).unwrap();
     let bins = Bins::new(grid, &measure(&broad()));
-    let known = Known::new(&bins);
-    let settings = Settings {
-        nodes: 48,
-        ..Settings::DEFAULT
+    let data = Data::new(&bins);
+    let settings = FillSettings {
+        neighbours: 48,
+        ..FillSettings::DEFAULT
     };
-    let calibration = Calibration::new(&known, &settings).unwrap();
-    let (dense, bars) = fill_with_errors(&known, &settings, &calibration, &|_| ()).unwrap();
-    assert_eq!(dense, fill(&known, &settings, &|_| ()).unwrap());
+    let calibration = Calibration::new(&data, &settings).unwrap();
+    let (dense, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
+    assert_eq!(dense, fill(&data, &settings, &|_| ()).unwrap());
     for plane in &bars.standard_error {
         assert!(plane.iter().all(|e| e.is_finite() && *e >= 0.0));
     }
@@ -236,14 +221,14 @@ fn a_gap_in_azimuth_is_extrapolated() {
         !in_gap(s.theta_i_deg, s.phi_i_deg) && !in_gap(s.theta_v_deg, s.phi_v_deg)
     });
     let bins = Bins::new(grid, &samples);
-    let known = Known::new(&bins);
-    let settings = Settings {
-        nodes: 32,
+    let data = Data::new(&bins);
+    let settings = FillSettings {
+        neighbours: 32,
         tolerance: f32::INFINITY,
-        ..Settings::DEFAULT
+        ..FillSettings::DEFAULT
     };
-    let calibration = Calibration::new(&known, &settings).unwrap();
-    let (_, bars) = fill_with_errors(&known, &settings, &calibration, &|_| ()).unwrap();
+    let calibration = Calibration::new(&data, &settings).unwrap();
+    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
     let origin = |i: (f64, f64), v: (f64, f64)| {
         let at = |(theta, phi)| grid.nearest(theta, phi).unwrap();
         bars.origin[grid.cell(at(i), at(v))]
@@ -257,7 +242,7 @@ fn a_gap_in_azimuth_is_extrapolated() {
 }
 
 #[test]
-fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
+fn a_pair_is_refined_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
     let grid = Grid::PAPER;
     let sharp = Kurt::new(
         [0.2; 3],
@@ -271,13 +256,14 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
         }],
     );
     let at = |theta: f64, phi: f64| -> Vec3 { Direction::from_deg(theta, phi).to_vec3() };
-    let cut = |model: &dyn Brdf, view: Vec3| {
+    let is_refined = |model: &dyn Brdf, view: Vec3| {
         let bins = Bins::new(grid, &measure(model));
-        let settings = Settings {
+        let settings = FillSettings {
             noise_variance: (NOISE * NOISE) as f32,
-            ..Settings::DEFAULT
+            ..FillSettings::DEFAULT
         };
-        let levels = Levels::with_mirror_images(half_of_nodes(&bins, 1, settings.coordinates), 1);
+        let hierarchy =
+            Hierarchy::with_mirror_images(half_of_data(&bins, 1, settings.coordinates), 1);
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
         let around = |d: Vec3| {
             let near = |p: &&Patch| (0..3).map(|k| p.centre[k] * d[k]).sum::<f64>();
@@ -286,35 +272,39 @@ fn a_pair_is_cut_where_a_sharp_lobe_passes_and_nowhere_on_a_matte_material() {
                 .max_by(|a, b| near(a).total_cmp(&near(b)))
                 .unwrap()
         };
-        let mut refiner = Refiner::default();
-        refiner.solve(&levels, &settings, around(at(30.0, 0.0)), around(view));
-        refiner.count.cut == 1
+        let pair = (around(at(30.0, 0.0)), around(view));
+        let mut refiner = Refiner::new(&settings);
+        let solved = refiner.solve(&hierarchy, &settings, pair, false);
+        solved.refined.is_some()
     };
-    assert!(cut(&sharp, at(32.0, 180.0)));
-    assert!(!cut(&sharp, at(45.0, 90.0)));
-    assert!(!cut(&Kurt::white_reference_fabric(), at(32.0, 180.0)));
+    assert!(is_refined(&sharp, at(32.0, 180.0)));
+    assert!(!is_refined(&sharp, at(45.0, 90.0)));
+    assert!(!is_refined(
+        &Kurt::white_reference_fabric(),
+        at(32.0, 180.0)
+    ));
 }
 
 #[test]
-fn samples_without_frames_are_held_out_by_clusters() {
+fn samples_without_frames_are_grouped_by_clusters() {
     let mut samples = measure(&broad());
     samples.iter_mut().for_each(|s| s.frame = Sample::NO_FRAME);
     let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &samples);
-    let known = Known::new(&bins);
+    let data = Data::new(&bins);
     let coordinates = Coordinates::sum_difference(1.0);
-    let held_out = HoldOut::new(&bins, 0, 24, 500).unwrap();
-    let settings = Settings {
+    let fold = Fold::new(&bins, 0, 24, 500).unwrap();
+    let settings = FillSettings {
         coordinates,
-        ..Settings::DEFAULT
+        ..FillSettings::DEFAULT
     };
-    let predictions = held_out.predict(&known, &settings);
+    let predictions = fold.predict(&data, &settings);
     assert!(predictions.len() >= 100);
     let near = predictions
         .iter()
         .filter(|p| p.residual[1].unwrap().abs() < 0.1)
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
-    assert_eq!(select(&known, Settings::DEFAULT).trials.len(), 4);
+    assert_eq!(select(&data, FillSettings::DEFAULT).candidates.len(), 4);
 }
 
 #[test]
@@ -322,16 +312,16 @@ fn on_few_poses_presets_choose_alike_and_the_slower_is_the_nearer() {
     let grid = Grid::with_step_deg(4.0).unwrap();
     for model in others() {
         let bins = Bins::new(grid, &measure(&*model));
-        let known = Known::new(&bins);
+        let data = Data::new(&bins);
         let chosen = [Preset::Preview, Preset::Fast, Preset::Default]
-            .map(|preset| select(&known, preset.settings()).settings);
-        let choice = |s: &Settings| (s.coordinates, s.kernel_weight);
+            .map(|preset| select(&data, preset.settings()).settings);
+        let choice = |s: &FillSettings| (s.coordinates, s.kernel_weight);
         assert!(
             chosen.iter().all(|s| choice(s) == choice(&chosen[0])),
             "{chosen:?}"
         );
         let errors = chosen.map(|settings| {
-            let dense = fill(&known, &settings, &|_| ()).unwrap();
+            let dense = fill(&data, &settings, &|_| ()).unwrap();
             interior_error(&dense, &*model)
         });
         println!("{errors:?}");
@@ -364,19 +354,19 @@ fn interior_error(dense: &DenseBrdf, model: &dyn Brdf) -> f64 {
 }
 
 #[test]
-fn blocks_leave_no_seams_whole_or_cut() {
+fn blocks_leave_no_seams_whole_or_refined() {
     // Blocks of as many cells as on the 2° grid.
     let grid = Grid::with_step_deg(3.0).unwrap();
     for (model, tolerance) in [(broad(), f32::INFINITY), (Kurt::two_thread_fabric(), 1.0)] {
         let bins = Bins::new(grid, &measure_every(2, &model));
-        let known = Known::new(&bins);
-        let settings = Settings {
+        let data = Data::new(&bins);
+        let settings = FillSettings {
             block_deg: 12.0,
             tolerance,
             noise_variance: (NOISE * NOISE) as f32,
-            ..Settings::DEFAULT
+            ..FillSettings::DEFAULT
         };
-        let dense = fill(&known, &settings, &|_| ()).unwrap();
+        let dense = fill(&data, &settings, &|_| ()).unwrap();
         let (across, inside) = bends(&dense, &model, settings.block_deg);
         println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
         // 1.6 times where blending may shift blocks by their usual difference only.
@@ -429,34 +419,94 @@ fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
 fn on_a_sparse_plan_fine_blocks_stay_within_their_budget() {
     let grid = Grid::with_step_deg(4.0).unwrap();
     let bins = Bins::new(grid, &measure(&Kurt::two_thread_fabric()));
-    let known = Known::new(&bins);
+    let data = Data::new(&bins);
     let chosen = |budget: f32| {
-        let base = Settings {
+        let base = FillSettings {
             block_deg: 20.0,
-            nodes: 48,
+            neighbours: 48,
             budget,
-            ..Settings::DEFAULT
+            ..FillSettings::DEFAULT
         };
-        select(&known, base).settings
+        select(&data, base).settings
     };
     // What the plan asks for, and a half of it.
-    let blocks_cut = |settings: &Settings| {
-        let levels = Levels::with_mirror_images(half_of_nodes(&bins, 1, settings.coordinates), 1);
+    let fine_blocks = |settings: &FillSettings| {
+        let hierarchy =
+            Hierarchy::with_mirror_images(half_of_data(&bins, 1, settings.coordinates), 1);
         let patches = cover(grid, &[settings.block_deg, 0.5 * settings.block_deg]).patches;
-        let mut refiner = Refiner::default();
+        let mut refiner = Refiner::new(settings);
+        let (mut parts, mut pairs) = (0, 0);
         for (k, p) in patches.iter().enumerate() {
             for q in &patches[k..] {
-                refiner.solve(&levels, settings, p, q);
+                let solved = refiner.solve(&hierarchy, settings, (p, q), false);
+                parts += solved.refined.unwrap_or(0);
+                pairs += 1;
             }
         }
-        refiner.count.parts as f32 / refiner.count.pairs as f32
+        parts as f32 / pairs as f32
     };
     let unlimited = chosen(f32::INFINITY);
-    assert_eq!(unlimited.tolerance, Settings::DEFAULT.tolerance);
-    let wanted = blocks_cut(&unlimited);
+    assert_eq!(unlimited.tolerance, FillSettings::DEFAULT.tolerance);
+    let wanted = fine_blocks(&unlimited);
     let limited = chosen(0.5 * wanted);
     assert!(limited.tolerance > unlimited.tolerance);
-    let spent = blocks_cut(&limited);
+    let spent = fine_blocks(&limited);
     println!("{wanted} blocks a pair wanted, {spent} spent");
     assert!((0.35..0.65).contains(&(spent / wanted)), "{spent} {wanted}");
+}
+
+/// Matérn 5/2, as a user writes it: without vectors.
+struct Matern52;
+
+impl Kernel for Matern52 {
+    fn name(&self) -> &str {
+        "matern-5/2"
+    }
+    fn scale(&self) -> f32 {
+        5f32.sqrt()
+    }
+    fn correlation(&self, s: f32) -> f32 {
+        (1.0 + s + s * s / 3.0) * (-s).exp()
+    }
+}
+
+#[test]
+fn a_kernel_of_ones_own_fills_as_well_as_the_default_and_is_named() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let model = broad();
+    let bins = Bins::new(grid, &measure(&model));
+    let data = Data::new(&bins);
+    let filled = |base: FillSettings| {
+        let settings = select(&data, base).settings;
+        let dense = fill(&data, &settings, &|_| ()).unwrap();
+        (settings, interior_error(&dense, &model), dense)
+    };
+    let base = FillSettings {
+        block_deg: 12.0,
+        ..FillSettings::DEFAULT
+    };
+    let (_, usual, dense) = filled(base);
+    let (settings, own, own_dense) = filled(FillSettings {
+        kernel: &Matern52,
+        ..base
+    });
+    println!("errors {usual} by default, {own} by Matern 5/2");
+    assert_ne!(dense, own_dense);
+    assert!((0.5..1.5).contains(&(own / usual)), "{own} {usual}");
+    assert!(settings.to_string().contains("matern-5/2"));
+    assert_ne!(
+        settings,
+        FillSettings {
+            kernel: FillSettings::DEFAULT.kernel,
+            ..settings
+        }
+    );
+    // And its error bars are its own.
+    let calibration = Calibration::new(&data, &settings).unwrap();
+    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
+    assert!(
+        bars.standard_error[1]
+            .iter()
+            .all(|e| *e > 0.0 && e.is_finite())
+    );
 }

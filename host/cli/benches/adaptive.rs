@@ -12,7 +12,9 @@ mod drawing;
 
 use drawing::{Line, draw};
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::interpolate::{Calibration, ErrorBars, Known, Settings, fill_with_errors, select};
+use gonia_brdf::interpolate::{
+    Calibration, Data, ErrorBars, FillSettings, fill_with_errors, select,
+};
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Pose, Sample};
 use gonia_pipeline::compare::Table;
@@ -131,8 +133,8 @@ fn compared(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
 
 fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars) {
     let bins = Bins::new(grid, &measure(model, poses));
-    let known = Known::new(&bins);
-    let settings = select(&known, Settings::DEFAULT).settings;
+    let known = Data::new(&bins);
+    let settings = select(&known, FillSettings::DEFAULT).settings;
     let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
     fill_with_errors(&known, &settings, &calibration, &|_| ()).expect("bins")
 }

@@ -3,7 +3,7 @@
 use crate::progress::Progress;
 use crate::table;
 use anyhow::{Context, Result, bail};
-use gonia_brdf::fit::{Family, Loss, Settings};
+use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
 use gonia_formats::check_writable_beside;
 use gonia_formats::dense_exr::read_dense;
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
@@ -26,7 +26,7 @@ pub struct Fit {
     samples: Option<PathBuf>,
     /// Which model to fit
     #[arg(long, value_name = "MODEL")]
-    model: Family,
+    model: StandardFamily,
     /// The fitted model as a dense BRDF, on the same grid (OpenEXR)
     #[arg(short, long, value_name = "FIT.exr")]
     output: Option<PathBuf>,
@@ -34,16 +34,16 @@ pub struct Fit {
     #[arg(long, value_enum, default_value = "log")]
     loss: LossArgument,
     /// Cells to fit to: half of them spread evenly, half where it is bright
-    #[arg(long, value_name = "N", default_value_t = Settings::default().cells)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().cells)]
     cells: usize,
     /// Random starts
-    #[arg(long, value_name = "N", default_value_t = Settings::default().starts)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().starts)]
     starts: usize,
     /// Most steps of a search
-    #[arg(long, value_name = "N", default_value_t = Settings::default().iterations)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().iterations)]
     iterations: usize,
     /// Seed of cells and starts
-    #[arg(long, default_value_t = Settings::default().seed)]
+    #[arg(long, default_value_t = FitSettings::default().seed)]
     seed: u64,
 }
 
@@ -56,7 +56,7 @@ enum LossArgument {
 impl Fit {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let settings = Settings {
+        let settings = FitSettings {
             loss: match self.loss {
                 LossArgument::Log => Loss::Logarithm,
                 LossArgument::Cosine => Loss::Cosine,

@@ -3,7 +3,7 @@
 use crate::baselines::make_and_print;
 use crate::progress::Progress;
 use anyhow::Result;
-use gonia_brdf::fit::Settings;
+use gonia_brdf::fit::FitSettings;
 use gonia_formats::check_writable;
 use gonia_pipeline::baselines::BaselineOptions;
 use gonia_report::report_folder;
@@ -37,7 +37,7 @@ impl Report {
         if self.rivals {
             let options = BaselineOptions {
                 without_paper: false,
-                fits: Settings::default(),
+                fits: FitSettings::default(),
             };
             make_and_print(&self.folder, None, &options)?;
         }

@@ -2,7 +2,7 @@
 
 use crate::baselines::make_and_print;
 use anyhow::{Result, bail};
-use gonia_brdf::fit::Settings as FitSettings;
+use gonia_brdf::fit::FitSettings;
 use gonia_pipeline::baselines::BaselineOptions;
 use std::path::PathBuf;
 

@@ -1,7 +1,7 @@
 //! A fitted model as a file beside its dense EXR: `kurt2.exr` has `kurt2.fit.toml`.
 
 use crate::{FileError, toml_text, write_whole_bytes};
-use gonia_brdf::fit::Fit;
+use gonia_brdf::fit::{FittedModel, ModelFamily};
 use gonia_rig::Figures;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ pub struct FittedNumber {
 
 impl FitNote {
     /// The note of a fit.
-    pub fn new(fit: &Fit, seconds: f64, figures: Figures) -> Self {
+    pub fn new(fit: &FittedModel, seconds: f64, figures: Figures) -> Self {
         let numbers = fit.family.parameters().into_iter().enumerate();
         Self {
             model: fit.family.to_string(),

@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
-use gonia_brdf::cellwise::{self, CellSettings, SettingsError};
-use gonia_brdf::interpolate::{self, ByRows, Calibration, ErrorBars, Known, Preset, Settings};
+use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
+use gonia_brdf::interpolate::{self, ByRows, Calibration, Data, ErrorBars, FillSettings, Preset};
 use gonia_brdf::{Bins, DenseBrdf, Grid};
 use gonia_formats::dense_exr::write_dense_by_rows;
 use gonia_rig::{DenseFile, SampleSet};
@@ -52,14 +52,14 @@ pub enum FillMethod {
     /// Blocks that share a kriging system, with the settings that suit the material.
     Blocks,
     /// One cell at a time: the paper's method and other baselines.
-    Cellwise(CellSettings),
+    Cellwise(BaselineSettings),
 }
 
 impl FromStr for FillMethod {
-    type Err = SettingsError;
+    type Err = UnknownBaseline;
 
     /// `default`, `paper`, or another baseline by name.
-    fn from_str(text: &str) -> Result<Self, SettingsError> {
+    fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
         if text == "default" {
             return Ok(FillMethod::Blocks);
         }
@@ -83,7 +83,7 @@ impl FillOptions {
     ///
     /// # Errors
     /// A value that is not possible, or two that do not go together.
-    pub fn check(&self) -> Result<(Grid, Settings), Error> {
+    pub fn check(&self) -> Result<(Grid, FillSettings), Error> {
         let refuse = |option, found: String, remedy: String| {
             Err(Error::Option {
                 option,
@@ -97,12 +97,12 @@ impl FillOptions {
             remedy: error.to_string(),
         })?;
         let preset = self.preset.settings();
-        let settings = Settings {
+        let settings = FillSettings {
             // Blocks of few cells share too little.
             block_deg: self
                 .block_deg
                 .unwrap_or(preset.block_deg.max(2.0 * self.step_deg)),
-            nodes: self.nodes.unwrap_or(preset.nodes),
+            neighbours: self.nodes.unwrap_or(preset.neighbours),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
             // Who asks for a tolerance gets it.
             budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
@@ -124,10 +124,10 @@ impl FillOptions {
                 ),
             );
         }
-        if !(8..=1024).contains(&settings.nodes) {
+        if !(8..=1024).contains(&settings.neighbours) {
             return refuse(
                 "--nodes",
-                settings.nodes.to_string(),
+                settings.neighbours.to_string(),
                 "must lie in 8..=1024".into(),
             );
         }
@@ -219,7 +219,7 @@ pub fn fill(
         }
         FillMethod::Cellwise(settings) => {
             let filled = step(progress, Step::Interpolating, |share| {
-                cellwise::fill(&binned.bins, &settings, share).map_err(Error::from)
+                baselines::fill(&binned.bins, &settings, share).map_err(Error::from)
             })?;
             let counts = FillCounts {
                 failed: filled.failed,
@@ -278,7 +278,7 @@ pub struct FilledBins {
     /// Standard errors, where asked for.
     pub errors: Option<ErrorBars>,
     /// The settings, as chosen for the material.
-    pub settings: Settings,
+    pub settings: FillSettings,
 }
 
 /// Interpolates bins block by block, with the settings that suit the material, starting from `base`.
@@ -287,7 +287,7 @@ pub struct FilledBins {
 /// Too few bins, or too few frames for standard errors.
 pub fn fill_bins(
     bins: &Bins,
-    base: Settings,
+    base: FillSettings,
     with_errors: bool,
     progress: &Progress<'_>,
 ) -> Result<FilledBins, Error> {
@@ -315,13 +315,21 @@ pub fn fill_bins(
     })
 }
 
-fn sorted<'a>(bins: &'a Bins, base: Settings, progress: &Progress<'_>) -> Result<Known<'a>, Error> {
+fn sorted<'a>(
+    bins: &'a Bins,
+    base: FillSettings,
+    progress: &Progress<'_>,
+) -> Result<Data<'a>, Error> {
     step(progress, Step::Sorting, |_| {
-        Ok(Known::thinned(bins, base.one_bin_in))
+        Ok(Data::thinned(bins, base.one_bin_in))
     })
 }
 
-fn chosen(known: &Known<'_>, base: Settings, progress: &Progress<'_>) -> Result<Settings, Error> {
+fn chosen(
+    known: &Data<'_>,
+    base: FillSettings,
+    progress: &Progress<'_>,
+) -> Result<FillSettings, Error> {
     step(progress, Step::ChoosingSettings, |_| {
         Ok(interpolate::select(known, base).settings)
     })
@@ -373,7 +381,7 @@ mod tests {
         assert_eq!("default".parse(), Ok(FillMethod::Blocks));
         assert_eq!(
             "paper".parse(),
-            Ok(FillMethod::Cellwise(CellSettings::PAPER))
+            Ok(FillMethod::Cellwise(BaselineSettings::PAPER))
         );
         assert!("papers".parse::<FillMethod>().is_err());
     }
@@ -393,7 +401,7 @@ mod tests {
             (
                 wrong(|o| {
                     o.with_errors = true;
-                    o.method = FillMethod::Cellwise(CellSettings::PAPER);
+                    o.method = FillMethod::Cellwise(BaselineSettings::PAPER);
                 }),
                 "--error with --method",
             ),

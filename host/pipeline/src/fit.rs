@@ -4,7 +4,7 @@ use crate::Error;
 use crate::compare::{Options, Side, Table, compare};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
-use gonia_brdf::fit::{self, Cell, Family, Settings};
+use gonia_brdf::fit::{self, Cell, FitSettings, StandardFamily};
 use gonia_brdf::{Bins, DenseBrdf, Sample};
 use gonia_formats::dense_exr::write_dense;
 use gonia_formats::fit_toml::FitNote;
@@ -22,7 +22,7 @@ pub struct FitResult {
 }
 
 /// Cells to fit to: of the dense BRDF itself, half of them spread evenly and half where it is bright.
-pub fn cells_of_dense(dense: &DenseBrdf, settings: &Settings) -> Vec<Cell> {
+pub fn cells_of_dense(dense: &DenseBrdf, settings: &FitSettings) -> Vec<Cell> {
     fit::draw(dense, settings.cells, settings.seed)
 }
 
@@ -33,7 +33,7 @@ pub fn cells_of_dense(dense: &DenseBrdf, settings: &Settings) -> Vec<Cell> {
 pub fn cells_of_samples(
     dense: &DenseBrdf,
     samples: &[Sample],
-    settings: &Settings,
+    settings: &FitSettings,
 ) -> Result<Vec<Cell>, Error> {
     let bins = Bins::new(dense.grid(), samples);
     let cells = fit::draw_measured(&bins, settings.cells, settings.seed);
@@ -52,8 +52,8 @@ pub fn fit_model(
     measured: &DenseFile,
     name: &str,
     cells: &[Cell],
-    family: Family,
-    settings: &Settings,
+    family: StandardFamily,
+    settings: &FitSettings,
     progress: &Progress<'_>,
 ) -> Result<FitResult, Error> {
     let family = family.for_values(measured.scale == Scale::Relative);

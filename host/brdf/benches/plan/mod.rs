@@ -18,19 +18,19 @@ pub const MATERIALS: [&str; 8] = [
 
 /// The materials that arguments name, these and those of `gonia demo`; without one, those above.
 #[allow(dead_code)]
-pub fn asked(arguments: &[String]) -> Vec<&'static str> {
+pub fn named(arguments: &[String]) -> Vec<&'static str> {
     let others = Material::NAMES.into_iter();
-    let known = MATERIALS
+    let all = MATERIALS
         .into_iter()
         .chain(others.filter(|name| !MATERIALS.contains(name)));
-    let mut asked: Vec<_> = known.filter(|n| arguments.iter().any(|a| a == n)).collect();
-    if asked.is_empty() {
-        asked = MATERIALS.to_vec();
+    let mut named: Vec<_> = all.filter(|n| arguments.iter().any(|a| a == n)).collect();
+    if named.is_empty() {
+        named = MATERIALS.to_vec();
     }
-    asked
+    named
 }
 
-/// The material of a name that [`asked`] gave.
+/// The material of a name that [`named`] gave.
 #[allow(clippy::expect_used)]
 pub fn material(name: &str) -> Arc<dyn Brdf> {
     let lobe = |specular: f64, mx, my| KurtLobe {

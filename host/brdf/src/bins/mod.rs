@@ -4,6 +4,7 @@ mod node;
 mod noise;
 
 use crate::grid::Grid;
+use crate::quantile::median;
 use crate::sample::Sample;
 use node::{Node, Nodes};
 use rayon::prelude::*;
@@ -38,7 +39,7 @@ pub struct Bins {
 }
 
 impl Bins {
-    /// Bins samples to their nearest nodes. Samples beyond the grid's last elevation, and samples
+    /// Bins samples to their nearest nodes. Samples beyond the grid's last polar angle, and samples
     /// with a value or an angle that is not finite, are counted as outside.
     pub fn new(grid: Grid, samples: &[Sample]) -> Self {
         // Sorting ten million cells at once goes through memory many times. Sorted by their light
@@ -51,7 +52,7 @@ impl Bins {
             .collect();
         let nodes = Nodes::new(grid);
         let lights: Vec<usize> = (0..grid.n_directions()).collect();
-        let asked_one_in = samples.len().div_ceil(NOISE_SAMPLES).max(1) | 1;
+        let noise_one_in = samples.len().div_ceil(NOISE_SAMPLES).max(1) | 1;
         let (parts, variances): (Vec<Vec<Bin>>, Vec<Vec<f32>>) = lights
             .par_chunks(LIGHTS_AT_A_TIME)
             .map(|lights| {
@@ -80,7 +81,7 @@ impl Bins {
                         let nodes = (nodes.at(light), nodes.at(view_of(same[0])));
                         let cell = grid.cell(light, view_of(same[0]));
                         bins.push(summarize(cell, nodes, group, &mut scratch));
-                        if cell.is_multiple_of(asked_one_in) {
+                        if cell.is_multiple_of(noise_one_in) {
                             variances
                                 .extend(noise::variances_about_plane(group).into_iter().flatten());
                         }
@@ -290,43 +291,11 @@ pub fn variance_of_median(count: u32) -> f32 {
     (FRAC_PI_2 * n / (n + fewer)).max(1.0)
 }
 
-/// The median of finite values, which are reordered; of an even number the mean of the middle two.
-/// 0 of none.
-pub fn median(values: &mut [f32]) -> f32 {
-    let n = values.len();
-    if n == 0 {
-        return 0.0;
-    }
-    // Most bins hold a few samples.
-    if n <= 12 {
-        for k in 1..n {
-            let mut at = k;
-            while at > 0 && values[at - 1] > values[at] {
-                values.swap(at - 1, at);
-                at -= 1;
-            }
-        }
-        let middle = values[n / 2];
-        return if n % 2 == 1 {
-            middle
-        } else {
-            0.5 * (values[n / 2 - 1] + middle)
-        };
-    }
-    let (below, middle, _) = values.select_nth_unstable_by(n / 2, f32::total_cmp);
-    let middle = *middle;
-    if n % 2 == 1 {
-        middle
-    } else {
-        let lower = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        0.5 * (lower + middle)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::direction::Direction;
+    use crate::random::Random;
 
     fn sample(theta_i: f32, phi_i: f32, value: f32, frame: u32) -> Sample {
         Sample {
@@ -366,17 +335,13 @@ mod tests {
 
     #[test]
     fn logarithms_of_noisy_bins_have_the_mean_of_the_truth() {
-        let mut state = 1u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-            (state >> 33) as f32 / (1u64 << 31) as f32
-        };
+        let mut random = Random::new(1);
         for count in [1, 2, 5] {
             let samples: Vec<Sample> = (0..7920 * 4)
                 .flat_map(|k| vec![k; count])
                 .chain((0..7920).flat_map(|_| vec![0; 6]))
                 .map(|k| {
-                    let normal = (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+                    let normal = random.normal() as f32;
                     let (row, column) = (k / 180, k % 180);
                     Sample {
                         theta_v_deg: 2.0 * (row % 40 + 1) as f32,
@@ -444,19 +409,5 @@ mod tests {
         assert_eq!((bins.bins().len(), bins.outside()), (1, 1));
         let light = Direction::from_vec3(bins.bins()[0].light.map(f64::from));
         assert!((light.phi_deg() - 350.5).abs() < 1e-4, "{light:?}");
-    }
-
-    #[test]
-    fn medians_of_even_odd_and_none() {
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
-        assert_eq!(median(&mut []), 0.0);
-        for n in 1..40u16 {
-            let mut values: Vec<f32> = (0..n).map(|k| f32::from(k * 79 % 64)).collect();
-            let mut sorted = values.clone();
-            sorted.sort_by(f32::total_cmp);
-            let (low, high) = (sorted[usize::from((n - 1) / 2)], sorted[usize::from(n / 2)]);
-            assert_eq!(median(&mut values), 0.5 * (low + high), "{n}");
-        }
     }
 }

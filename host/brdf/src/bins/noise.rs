@@ -4,6 +4,7 @@
 //! where highlights are narrow: a material of nothing but narrow highlights would seem to be noisy.
 
 use crate::direction::Direction;
+use crate::quantile::quantile;
 use crate::sample::Sample;
 
 /// Directions of light and view, one after the other.
@@ -61,11 +62,7 @@ pub fn variances_about_plane(group: &[Sample]) -> Option<[f32; 3]> {
 /// off, it is not noise that shows: the quarter that scatters least decides.
 pub fn usual(mut variances: Vec<f32>) -> Option<f32> {
     variances.retain(|v| v.is_finite() && *v > 0.0);
-    if variances.is_empty() {
-        return None;
-    }
-    let quarter = variances.len() / 4;
-    Some(*variances.select_nth_unstable_by(quarter, f32::total_cmp).1)
+    quantile(&mut variances, 0.25)
 }
 
 /// First quartile of χ² with so many degrees of freedom, over their number; beyond a few by Wilson and Hilferty's
@@ -95,20 +92,15 @@ fn norm(a: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Samples on the sheet of one frame, their logarithms with a slope, so much a degree, and so much noise.
-    fn group(state: &mut u64, slope: f32, noise: f32, count: usize) -> Vec<Sample> {
-        let mut uniform = || {
-            *state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-            (*state >> 33) as f32 / (1u64 << 31) as f32
-        };
+    fn group(random: &mut Random, slope: f32, noise: f32, count: usize) -> Vec<Sample> {
         (0..count)
             .map(|_| {
-                let (x, y) = (2.0 * uniform() - 1.0, 2.0 * uniform() - 1.0);
-                let rgb = [0, 1, 2].map(|_| {
-                    let normal = (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
-                    (slope * (x + 0.5 * y) + noise * normal).exp()
-                });
+                let [x, y] = [(); 2].map(|()| random.between(-1.0, 1.0) as f32);
+                let rgb = [0, 1, 2]
+                    .map(|_| (slope * (x + 0.5 * y) + noise * random.normal() as f32).exp());
                 Sample {
                     theta_i_deg: 40.0 + x,
                     phi_i_deg: 100.0 + 1.5 * y,
@@ -123,11 +115,11 @@ mod tests {
 
     #[test]
     fn noise_is_found_whatever_the_slope_and_the_number_of_samples() {
-        let mut state = 1u64;
+        let mut random = Random::new(1);
         for (slope, noise) in [(0.0, 0.02), (0.3, 0.02), (0.3, 0.2)] {
             for count in [4, 5, 6, 9, 30] {
                 let variances = (0..6000)
-                    .filter_map(|_| variances_about_plane(&group(&mut state, slope, noise, count)))
+                    .filter_map(|_| variances_about_plane(&group(&mut random, slope, noise, count)))
                     .flatten();
                 let sigma = usual(variances.collect()).unwrap().sqrt();
                 assert!(
@@ -140,9 +132,9 @@ mod tests {
 
     #[test]
     fn samples_of_one_place_tell_noise_too_and_too_few_nothing() {
-        let mut state = 7u64;
+        let mut random = Random::new(7);
         let repeated = (0..6000).filter_map(|_| {
-            let mut group = group(&mut state, 0.0, 0.05, 3);
+            let mut group = group(&mut random, 0.0, 0.05, 3);
             let first = group[0];
             for sample in &mut group {
                 let rgb = sample.rgb;
@@ -153,9 +145,9 @@ mod tests {
         let sigma = usual(repeated.flatten().collect()).unwrap().sqrt();
         assert!((sigma - 0.05).abs() < 0.002, "{sigma}");
 
-        let few = group(&mut state, 0.0, 0.05, 3);
+        let few = group(&mut random, 0.0, 0.05, 3);
         assert_eq!(variances_about_plane(&few), None);
-        let mut dark = group(&mut state, 0.0, 0.05, 9);
+        let mut dark = group(&mut random, 0.0, 0.05, 9);
         dark[4].rgb[1] = -0.001;
         assert_eq!(variances_about_plane(&dark), None);
         assert_eq!(usual(Vec::new()), None);

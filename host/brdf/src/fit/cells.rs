@@ -1,12 +1,12 @@
 //! The cells that a model is fitted to: a few thousand say as much as sixty million.
 
-use super::random::Random;
 use crate::bins::Bins;
 use crate::dense::DenseBrdf;
 use crate::direction::Vec3;
+use crate::random::Random;
 
-/// Both elevations beyond this: nothing can be measured there, and nothing is fitted.
-const VOID_DEG: f64 = 78.0;
+/// With both polar angles beyond this nothing can be measured, and nothing is fitted.
+const UNMEASURED_DEG: f64 = 78.0;
 /// Candidates a cell that is chosen for its brightness.
 const CANDIDATES: usize = 64;
 
@@ -39,8 +39,8 @@ pub fn draw(dense: &DenseBrdf, count: usize, seed: u64) -> Vec<Cell> {
     };
     let candidate = || {
         let light = node(90.0);
-        let is_void_at = grid.direction(light).theta_deg() > VOID_DEG;
-        let view = node(if is_void_at { VOID_DEG - 1.0 } else { 90.0 });
+        let beyond = grid.direction(light).theta_deg() > UNMEASURED_DEG;
+        let view = node(if beyond { UNMEASURED_DEG - 1.0 } else { 90.0 });
         let (i, v) = (
             grid.direction(light).to_vec3(),
             grid.direction(view).to_vec3(),
@@ -99,7 +99,7 @@ mod tests {
     use crate::model::{Kurt, KurtLobe};
 
     #[test]
-    fn half_of_the_cells_lie_where_it_is_bright_and_none_in_the_void() {
+    fn half_of_the_cells_lie_where_it_is_bright_and_none_in_the_unmeasured_region() {
         let lobe = KurtLobe {
             specular: [1.0; 3],
             f0: 0.5,
@@ -114,8 +114,8 @@ mod tests {
         assert!((1500..=2000).contains(&cells.len()), "{}", cells.len());
         let bright = cells.iter().filter(|cell| cell.value[1] > 0.1).count();
         assert!(bright > cells.len() / 5, "{bright}");
-        let void = VOID_DEG.to_radians().cos() - 1e-9;
-        assert!(cells.iter().all(|c| c.light[2].max(c.view[2]) >= void));
+        let least = UNMEASURED_DEG.to_radians().cos() - 1e-9;
+        assert!(cells.iter().all(|c| c.light[2].max(c.view[2]) >= least));
         assert_eq!(draw(&dense, 2000, 1), cells);
     }
 }

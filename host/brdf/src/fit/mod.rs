@@ -8,17 +8,18 @@
 mod cells;
 mod family;
 mod least_squares;
-mod random;
 mod range;
+mod standard;
 mod uncertainty;
 
 pub use cells::{Cell, draw, draw_measured};
-pub use family::{Family, Parameter, UnknownFamily};
+pub use family::{ModelFamily, Parameter, Values};
 pub use range::Range;
+pub use standard::{StandardFamily, UnknownFamily};
 
 use crate::model::Brdf;
+use crate::random::Random;
 use least_squares::{Minimum, minimise};
-use random::Random;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -33,7 +34,7 @@ pub enum Loss {
 
 /// How to fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct FitSettings {
     /// What is minimised.
     pub loss: Loss,
     /// Cells to draw for the last search.
@@ -46,7 +47,7 @@ pub struct Settings {
     pub seed: u64,
 }
 
-impl Default for Settings {
+impl Default for FitSettings {
     fn default() -> Self {
         Self {
             loss: Loss::Logarithm,
@@ -60,13 +61,13 @@ impl Default for Settings {
 
 /// A fitted model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct FittedModel<F = StandardFamily> {
     /// The kind of model.
-    pub family: Family,
-    /// Its numbers, in their canonical form.
-    pub values: Vec<f64>,
-    /// The standard uncertainty of each, from how much residuals vary together over patches of 30°;
-    /// `None` where the data do not determine the number.
+    pub family: F,
+    /// The values of its parameters, in their canonical form.
+    pub values: Values,
+    /// The standard uncertainty of each, in the same order, from how much residuals vary together over
+    /// patches of 30°; `None` where the data do not determine the number.
     pub uncertainties: Vec<Option<f64>>,
     /// Root mean square of the residuals over the cells of the fit.
     pub residual_rms: f64,
@@ -86,6 +87,11 @@ pub enum FitError {
     /// No positive value.
     #[error("the BRDF holds no positive value to fit; check that it is a BRDF")]
     NotPositive,
+    /// A family does not know its own parameters.
+    #[error(
+        "the family makes no model of its own parameters; check that their names are the same in both"
+    )]
+    NoModel,
 }
 
 /// Cells and steps of the first look from each start.
@@ -97,17 +103,39 @@ const SECOND_CELLS: usize = 2500;
 const SECOND_ITERATIONS: usize = 60;
 
 /// Fits a family to cells, as [`draw`] or [`draw_measured`] gives `settings.cells` of them. `progress` is
-/// told the share done, 0 ..= 1, from any thread.
+/// called with the share done, 0 ..= 1, from any thread.
 ///
 /// # Errors
-/// No cell with a positive value.
-pub fn fit(
+/// No cell with a positive value, or a family without a model.
+pub fn fit<F: ModelFamily>(
     cells: &[Cell],
-    family: Family,
-    settings: &Settings,
+    family: F,
+    settings: &FitSettings,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Fit, FitError> {
-    let problem = Problem::new(cells, family, settings.loss)?;
+) -> Result<FittedModel<F>, FitError> {
+    let problem = Problem::new(cells, &family, settings.loss)?;
+    let (best, agreeing_starts) = search_from_many_starts(&problem, settings, progress);
+    progress(1.0);
+    let values = family.canonical(problem.named.with(&problem.values(&best.at)));
+    let uncertainties = uncertainty::standard(&problem, &values);
+    Ok(FittedModel {
+        values,
+        uncertainties,
+        residual_rms: (best.cost / (3 * cells.len()) as f64).sqrt(),
+        converged: best.converged,
+        iterations: best.iterations,
+        cells: cells.len(),
+        agreeing_starts,
+        family,
+    })
+}
+
+/// The best minimum, and how many of the starts that went on ended within one per cent of it.
+fn search_from_many_starts(
+    problem: &Problem<'_>,
+    settings: &FitSettings,
+    progress: &(dyn Fn(f64) + Sync),
+) -> (Minimum, usize) {
     let done = std::sync::atomic::AtomicUsize::new(0);
     let starts: Vec<u64> = (0..settings.starts.max(1) as u64).collect();
     let mut first: Vec<Minimum> = starts
@@ -116,7 +144,7 @@ pub fn fit(
         .map(|k| {
             let mut random =
                 Random::new(settings.seed ^ (k + 1).wrapping_mul(0x2545_f491_4f6c_dd1d));
-            let start = problem.to_free(&family.start(&mut random));
+            let start = problem.to_free(&problem.start(&mut random));
             let found = problem.search(
                 start,
                 FIRST_CELLS,
@@ -148,25 +176,12 @@ pub fn fit(
         .filter(|m| m.cost.sqrt() <= 1.01 * best_cost.sqrt())
         .count();
     let start = second.swap_remove(0).at;
-    let best = problem.search(start, cells.len(), settings.iterations);
-    progress(1.0);
-    let values = family.canonical(problem.values(&best.at));
-    let uncertainties = uncertainty::standard(&problem, &values);
-    let residuals = 3 * cells.len();
-    Ok(Fit {
-        family,
-        values,
-        uncertainties,
-        residual_rms: (best.cost / residuals as f64).sqrt(),
-        converged: best.converged,
-        iterations: best.iterations,
-        cells: cells.len(),
-        agreeing_starts,
-    })
+    let best = problem.search(start, problem.cells.len(), settings.iterations);
+    (best, agreeing_starts)
 }
 
-impl Fit {
-    /// The model. `None` only for a list of numbers of the wrong length.
+impl<F: ModelFamily> FittedModel<F> {
+    /// The model. `None` only where the values are not those of the family's parameters.
     pub fn model(&self) -> Option<Box<dyn Brdf>> {
         self.family.model(&self.values)
     }
@@ -175,8 +190,10 @@ impl Fit {
 /// Cells, and the model they are to be described by.
 struct Problem<'a> {
     cells: Vec<&'a Cell>,
-    family: Family,
+    family: &'a dyn ModelFamily,
     parameters: Vec<Parameter>,
+    /// Values with the parameters' names.
+    named: Values,
     loss: Loss,
     /// The mean of the values.
     mean: f64,
@@ -185,12 +202,16 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(cells: &'a [Cell], family: Family, loss: Loss) -> Result<Self, FitError> {
+    fn new(cells: &'a [Cell], family: &'a dyn ModelFamily, loss: Loss) -> Result<Self, FitError> {
         let sum: f64 = cells.iter().flat_map(|cell| cell.value).sum();
         let mean = sum / (3 * cells.len().max(1)) as f64;
         if mean.is_nan() || mean <= 0.0 {
             return Err(FitError::NotPositive);
         }
+        let parameters = family.parameters();
+        let middles = parameters.iter().map(|p| p.range.at_share(0.5)).collect();
+        let named = Values::new(&parameters, middles).ok_or(FitError::NoModel)?;
+        family.model(&named).ok_or(FitError::NoModel)?;
         // Dark and bright cells alternate, so that any first part is a fair sample.
         let half = cells.len().div_ceil(2);
         let (dark, bright) = cells.split_at(half);
@@ -202,7 +223,8 @@ impl<'a> Problem<'a> {
         Ok(Self {
             cells: mixed,
             family,
-            parameters: family.parameters(),
+            parameters,
+            named,
             loss,
             mean,
             unit: mean * PI,
@@ -218,7 +240,8 @@ impl<'a> Problem<'a> {
 
     fn residuals(&self, values: &[f64], cells: &[&Cell], out: &mut Vec<f64>) {
         out.clear();
-        let Some(model) = self.family.model(values) else {
+        let Some(model) = self.family.model(&self.named.with(values)) else {
+            out.push(f64::NAN);
             return;
         };
         let floor = 1e-3 * self.mean;
@@ -230,6 +253,14 @@ impl<'a> Problem<'a> {
                 Loss::Cosine => (f[c] - cell.value[c]) * cosines,
             }));
         }
+    }
+
+    /// A random place to start from.
+    fn start(&self, random: &mut Random) -> Values {
+        let drawn: Vec<f64> = self.parameters.iter().map(|p| p.draw(random)).collect();
+        let mut values = self.named.with(&drawn);
+        self.family.adjust_start(&mut values, random);
+        values
     }
 
     /// What a parameter's number is in the range's terms.

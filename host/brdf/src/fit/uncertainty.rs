@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Eigenvalues of the scaled normal matrix below this share of the largest belong to combinations
 /// of numbers that the data do not determine.
 const LEAST_EIGENVALUE: f64 = 1e-9;
-/// Patches of directions, about 30° wide: beyond each elevation so many sectors. An interpolated
+/// Patches of directions, about 30° wide: beyond each polar angle so many sectors. An interpolated
 /// table takes its values from a neighbourhood of about this size, and frames span 15° to 28°.
 const RINGS: [(f64, usize); 4] = [(0.0, 1), (15.0, 6), (45.0, 10), (75.0, 12)];
 

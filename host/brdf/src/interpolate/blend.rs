@@ -1,6 +1,6 @@
 //! Blocks without seams.
 //!
-//! Two blocks on either side of a border have different nodes, and differ there by a little. At every
+//! Two blocks on either side of a border have different data, and differ there by a little. At every
 //! pair of corners of patches all blocks that meet there are averaged; the cells of each block are
 //! then shifted by what it differs from these means, linearly in all four angles between corners.
 //! That makes the blocks agree at the corners, and leaves between them only what of their difference
@@ -8,7 +8,7 @@
 
 use super::from_corners::{FromCorners, weights_of};
 use super::patches::{Cover, Patch};
-use crate::bins::median;
+use crate::quantile::median;
 use rayon::prelude::*;
 
 /// Logarithms at the corners of all pairs of patches, and their means over the pairs that meet.

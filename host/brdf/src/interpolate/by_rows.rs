@@ -4,11 +4,11 @@
 //! rows of either patch. The same numbers in the same order give the same bits, so that the result is as
 //! reciprocal as one in memory.
 
-use super::Settings;
+use super::FillSettings;
 use super::blend::{Corners, Shifts};
+use super::data::Data;
 use super::exponential::exponentials;
-use super::fill::{FillError, Fit};
-use super::known::Known;
+use super::fill::{FillError, Task};
 use super::refine::Refiner;
 use pulp::Arch;
 use rayon::prelude::*;
@@ -16,12 +16,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A fill of which the rows are still to be made.
 pub struct ByRows<'a> {
-    fit: Fit<'a>,
+    task: Task<'a>,
     corners: Corners,
 }
 
 /// Working memory of one thread.
-#[derive(Default)]
 struct Work {
     refiner: Refiner,
     logs: Vec<[f32; 3]>,
@@ -30,18 +29,18 @@ struct Work {
 }
 
 impl<'a> ByRows<'a> {
-    /// Solves all pairs of patches once. `progress` is told the share done, from any thread.
+    /// Solves all pairs of patches once. `progress` is called with the share done, from any thread.
     ///
     /// # Errors
     /// Too few bins.
     pub fn new(
-        known: &'a Known,
-        settings: &'a Settings,
+        data: &'a Data,
+        settings: &'a FillSettings,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self, FillError> {
-        let fit = Fit::new(known, settings)?;
-        let corners = fit.solve_pairs(false, progress, &|_, _, _| ());
-        Ok(Self { fit, corners })
+        let task = Task::new(data, settings)?;
+        let corners = task.solve_pairs(false, progress, &|_, _| ());
+        Ok(Self { task, corners })
     }
 
     /// Makes all rows, and gives each (its number, and three channels of a value a view) to `take`, in
@@ -54,14 +53,20 @@ impl<'a> ByRows<'a> {
         progress: &(dyn Fn(f64) + Sync),
         take: &(impl Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
     ) -> Result<(), E> {
-        let grid = self.fit.grid;
+        let grid = self.task.grid;
         let (n, n_phi) = (grid.n_directions(), grid.n_phi());
-        let patches = &self.fit.cover.patches;
+        let patches = &self.task.cover.patches;
         let done = AtomicUsize::new(0);
+        let work = || Work {
+            refiner: Refiner::new(self.task.settings),
+            logs: Vec::new(),
+            shifts: Shifts::default(),
+            arch: Arch::new(),
+        };
         (0..patches.len())
             .into_par_iter()
             .with_max_len(1)
-            .try_for_each_init(Work::default, |work, p| {
+            .try_for_each_init(work, |work, p| {
                 let lights = &patches[p].directions;
                 let mut rows = [(); 3].map(|()| vec![0.0f32; lights.len() * n]);
                 for q in 0..patches.len() {
@@ -87,17 +92,18 @@ impl<'a> ByRows<'a> {
 
     /// Writes the cells of lights in patch `p` and views in patch `q`.
     fn write_pair(&self, work: &mut Work, p: usize, q: usize, rows: &mut [Vec<f32>; 3]) {
-        let patches = &self.fit.cover.patches;
-        let (settings, n) = (self.fit.settings, self.fit.grid.n_directions());
+        let patches = &self.task.cover.patches;
+        let (settings, n) = (self.task.settings, self.task.grid.n_directions());
         let (first, second) = (p.min(q), p.max(q));
         let pair = (&patches[first], &patches[second]);
-        work.refiner
-            .solve(self.fit.levels(), settings, pair.0, pair.1);
+        let solved = work
+            .refiner
+            .solve(self.task.hierarchy(), settings, pair, false);
         work.logs.clear();
-        work.logs.extend_from_slice(work.refiner.logs());
+        work.logs.extend_from_slice(solved.cells);
         let numbers = (first, second);
         self.corners
-            .blend(&self.fit.cover, numbers, &mut work.logs, &mut work.shifts);
+            .blend(&self.task.cover, numbers, &mut work.logs, &mut work.shifts);
         exponentials(work.arch, &mut work.logs);
         let width = pair.1.directions.len();
         for a in 0..patches[p].directions.len() {
@@ -148,17 +154,17 @@ mod tests {
             })
             .collect();
         let bins = Bins::new(grid, &samples);
-        // Tight enough that some pairs are cut.
-        let settings = Settings {
+        // Tight enough that some pairs are refined.
+        let settings = FillSettings {
             block_deg: 24.0,
-            nodes: 32,
-            ..Settings::DEFAULT
+            neighbours: 32,
+            ..FillSettings::DEFAULT
         };
-        let known = Known::new(&bins);
-        let dense = fill(&known, &settings, &|_| ()).unwrap();
+        let data = Data::new(&bins);
+        let dense = fill(&data, &settings, &|_| ()).unwrap();
         let n = grid.n_directions();
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
-        ByRows::new(&known, &settings, &|_| ())
+        ByRows::new(&data, &settings, &|_| ())
             .unwrap()
             .each_row(&|_| (), &|light, row| {
                 let mut planes = planes.lock().map_err(|_| ())?;

@@ -16,8 +16,8 @@ pub type Point = [f32; 6];
 /// (docs/results.md).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinates {
-    /// The power p of the sum's length, 0 ..= 1.
-    pub power: f64,
+    /// The exponent p of the sum's length, 0 ..= 1.
+    pub exponent: f64,
     /// Weight w of the difference.
     pub weight: f64,
 }
@@ -25,19 +25,25 @@ pub struct Coordinates {
 impl Coordinates {
     /// Half vector and difference.
     pub const fn half_difference(weight: f64) -> Self {
-        Self { power: 0.0, weight }
+        Self {
+            exponent: 0.0,
+            weight,
+        }
     }
 
     /// Sum and difference.
     pub const fn sum_difference(weight: f64) -> Self {
-        Self { power: 1.0, weight }
+        Self {
+            exponent: 1.0,
+            weight,
+        }
     }
 
     /// The point of a pair of unit vectors.
     pub fn point(&self, light: Vec3, view: Vec3) -> Point {
         let sum = [light[0] + view[0], light[1] + view[1], light[2] + view[2]];
         let length = crate::direction::dot(sum, sum).sqrt().max(1e-9);
-        let scale = std::f64::consts::SQRT_2 / length * self.stretch(0.5 * length);
+        let scale = std::f64::consts::SQRT_2 / length * self.raised(0.5 * length);
         let w = self.weight * std::f64::consts::FRAC_1_SQRT_2;
         [
             (sum[0] * scale) as f32,
@@ -50,12 +56,12 @@ impl Coordinates {
     }
 
     /// `x^p`, quick where it can be.
-    fn stretch(&self, x: f64) -> f64 {
-        match self.power {
+    fn raised(&self, x: f64) -> f64 {
+        match self.exponent {
             0.0 => 1.0,
             0.25 => x.sqrt().sqrt(),
             1.0 => x,
-            power => x.powf(power),
+            exponent => x.powf(exponent),
         }
     }
 
@@ -63,62 +69,62 @@ impl Coordinates {
     pub fn convert(&self, point: &Point, to: Coordinates) -> Point {
         let ratio = (to.weight / self.weight) as f32;
         let difference = [point[3] * ratio, point[4] * ratio, point[5] * ratio];
-        let scale = if self.power == to.power {
+        let scale = if self.exponent == to.exponent {
             1.0
         } else {
             // |i + v|² + |i − v|² = 4.
             let length2: f32 = difference.iter().map(|d| d * d).sum();
             let half2 = (1.0 - 0.5 / (to.weight * to.weight) as f32 * length2).max(2.5e-7);
-            half2.powf(0.5 * (to.power - self.power) as f32)
+            half2.powf(0.5 * (to.exponent - self.exponent) as f32)
         };
         let [x, y, z] = [point[0] * scale, point[1] * scale, point[2] * scale];
         [x, y, z, difference[0], difference[1], difference[2]]
     }
 
-    /// What logarithms rise by on their own in these coordinates.
-    pub fn trend(&self) -> Trend {
-        if self.power < 1.0 {
-            Trend {
+    /// The external drift of logarithms in these coordinates.
+    pub fn drift(&self) -> Drift {
+        if self.exponent < 1.0 {
+            Drift {
                 per_difference2: (0.5 / (self.weight * self.weight)) as f32,
             }
         } else {
-            Trend::NONE
+            Drift::NONE
         }
     }
 }
 
 impl std::fmt::Display for Coordinates {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (power, weight) = (self.power, self.weight);
-        match power {
+        let (exponent, weight) = (self.exponent, self.weight);
+        match exponent {
             0.0 => write!(f, "half/difference w={weight}"),
             1.0 => write!(f, "sum/difference w={weight}"),
-            _ => write!(f, "half/difference w={weight} p={power}"),
+            _ => write!(f, "half/difference w={weight} p={exponent}"),
         }
     }
 }
 
-/// What the logarithm of a BRDF rises by towards grazing light and view that face each other, in
+/// External drift: what the logarithm of a BRDF rises by towards grazing light and view that face each other, in
 /// half/difference coordinates: `−½ ln cos θd`, θd the angle from the half vector to either. Lobes are
 /// about 1 / cos θd there, bases are flat, and these coordinates see little of it: the half vector hardly moves. Interpolating what is
-/// left takes about a quarter off the error of sharp materials where one elevation is beyond 75° and the other beyond 60°
+/// left takes about a quarter off the error of sharp materials where one polar angle is beyond 75° and the other beyond 60°
 /// (docs/results.md). Coordinates with the sum of light and view, which is 2 cos θd long, need none.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Trend {
+pub struct Drift {
     /// `sin² θd` over the squared length of the second half of a point.
     per_difference2: f32,
 }
 
-/// Smallest square of a cosine that the trend tells from zero.
+/// Smallest square of a cosine that the drift tells from zero.
 const COS2_MIN: f32 = 1e-4;
 
-impl Trend {
-    /// No trend.
-    pub const NONE: Trend = Trend {
+impl Drift {
+    /// No drift.
+    pub const NONE: Drift = Drift {
         per_difference2: 0.0,
     };
 
-    /// The trend at a point.
+    /// The drift at a point.
     #[inline(always)]
     pub fn at(&self, point: &Point) -> f32 {
         if self.per_difference2 == 0.0 {
@@ -165,11 +171,11 @@ mod tests {
             Coordinates::half_difference(0.25),
             Coordinates::sum_difference(1.0),
             Coordinates {
-                power: 0.25,
+                exponent: 0.25,
                 weight: 1.0,
             },
             Coordinates {
-                power: 0.1,
+                exponent: 0.1,
                 weight: 1.0,
             },
         ];
@@ -196,10 +202,10 @@ mod tests {
         for weight in [0.25, 0.5] {
             let c = Coordinates::half_difference(weight);
             let expected = -0.5 * 60f64.to_radians().cos().ln();
-            assert!((f64::from(c.trend().at(&point(&c))) - expected).abs() < 1e-5);
+            assert!((f64::from(c.drift().at(&point(&c))) - expected).abs() < 1e-5);
         }
         let c = Coordinates::sum_difference(0.5);
-        assert_eq!(c.trend().at(&point(&c)), 0.0);
+        assert_eq!(c.drift().at(&point(&c)), 0.0);
     }
 
     #[test]

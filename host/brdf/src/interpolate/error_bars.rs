@@ -1,37 +1,36 @@
-//! Standard errors: the variance of the blocks, calibrated on bins held out. The value of a measured
+//! Standard errors: the variance of the blocks, calibrated by cross-validation. The value of a measured
 //! cell is a block's too, which its samples take part in by their number and their spread, so that its
 //! standard error is found in the same way.
 //!
-//! A block's own variance is a guess: it rests on one kernel and on few nodes. How far off it is,
-//! is measured on frames held out, class by class (elevation, brightness, and size of the guess): of the
-//! mean residual of a frame's bins in one block, because noise averages out of it and the block's error
+//! A block's own variance is a guess: it rests on one kernel and on few data. How far off it is,
+//! is measured on frames that were left out, class by class (polar angle, brightness, and size of the
+//! guess): of the mean residual of a frame's bins in one block, because noise averages out of it and the block's error
 //! does not. Each class gets the factor with which 95 % of these means lie within 1.96 standard errors, the
-//! bins' own noise included. Where that noise hides the error even so, the block's word stands.
+//! bins' own noise included. Where that noise hides the error even so, the block's own variance stands.
 
-use super::Settings;
-use super::hold_out::{HoldOut, Mean, Prediction};
-use super::known::Known;
-use super::nodes::SIGMA_PER_MAD;
-use crate::bins::{Bin, Bins, variance_of_median};
+use super::FillSettings;
+use super::cross_validation::{Fold, MeanPrediction, Prediction};
+use super::data::Data;
+use super::datum::SIGMA_PER_MAD;
+use crate::bins::{Bin, variance_of_median};
 use crate::dense::DenseBrdf;
-use crate::direction::{Vec3, dot};
-use crate::grid::Grid;
-use rayon::prelude::*;
+use crate::direction::Vec3;
+use crate::quantile::quantile;
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 pub const Z95: f32 = 1.96;
-/// Means of held-out bins that are looked at, at most.
+/// Means of left-out bins that are predicted, at most.
 const TESTS: usize = 12_000;
-/// One frame in so many is held out.
+/// A fold leaves out one frame in so many.
 const ONE_IN: u32 = 24;
 /// A class by size of the guess holds one in so many means of a part of the domain, at most …
 const SIZES: usize = 8;
-/// … and bins at least: fewer cannot tell a 95th percentile …
+/// … and bins at least: fewer do not determine a 95th percentile …
 const CLASS_MIN: usize = 100;
 /// … and is no wider than by this factor where there are enough: cells of a sparse plan lie where few
 /// of its own bins do.
 const CLASS_SPAN: f32 = 2.0;
-/// Elevations above this are a class of their own: views end there, degrees.
+/// Polar angles above this are a class of their own: views end there, degrees.
 const GRAZING_DEG: f64 = 75.0;
 /// The factor where noise alone makes the error: what the block itself says …
 const USUAL_FACTOR: f32 = 1.0;
@@ -40,32 +39,17 @@ const USUAL_SPREAD: f32 = 0.5;
 /// Standard deviation of a 95th percentile of squares of normal values over their 95th percentile,
 /// times the root of their number: `2 √(0.05 · 0.95) / (1.96 · 2 φ(1.96))`, φ the normal density.
 const PERCENTILE_SPREAD: f32 = 1.9;
-/// So well is the variance of the bins' noise known, as a share.
+/// So well is the variance of the bins' noise data, as a share.
 const NOISE_SPREAD: f32 = 0.1;
-/// A bin whose predicted variance is less than this share of its noise's tells of the noise alone.
+/// A bin whose predicted variance is less than this share of its noise's shows the noise alone.
 const NOISE_ALONE: f32 = 0.1;
-
-/// Where a cell's value comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Origin {
-    /// Samples fell into the cell.
-    Measured = 0,
-    /// Samples fell into the cell with light and view exchanged.
-    Reciprocal = 1,
-    /// Between measured directions.
-    Interpolated = 2,
-    /// Beyond all measured pairs of elevations, or in a gap of the directions: a guess, however small
-    /// its error seems.
-    Extrapolated = 3,
-}
 
 /// Standard errors of a dense BRDF.
 #[derive(Clone, Debug)]
 pub struct ErrorBars {
     /// Standard error per channel, in the unit of the values, cell by cell.
     pub standard_error: [Vec<f32>; 3],
-    /// An [`Origin`] a cell.
+    /// An [`Origin`](super::Origin) a cell.
     pub origin: Vec<u8>,
 }
 
@@ -110,18 +94,18 @@ struct Classes {
 }
 
 impl Calibration {
-    /// Calibrates on bins held out. `None` when too few frames (or clusters of directions) are there
-    /// to hold any out.
-    pub fn new(known: &Known, settings: &Settings) -> Option<Self> {
-        let bins = known.bins();
-        let sorted = known.sorted_for(settings.coordinates);
-        let known = sorted.as_ref().unwrap_or(known);
-        let sets = HoldOut::sets(bins);
+    /// Calibrates by cross-validation. `None` when there are too few frames (or clusters of directions)
+    /// for a fold.
+    pub fn new(data: &Data, settings: &FillSettings) -> Option<Self> {
+        let bins = data.bins();
+        let sorted = data.sorted_for(settings.coordinates);
+        let data = sorted.as_ref().unwrap_or(data);
+        let folds = Fold::usual_number(bins);
         let mut means = Vec::new();
-        for set in 0..sets {
-            let set = ONE_IN - 1 - set;
-            if let Some(held_out) = HoldOut::new(bins, set, ONE_IN, TESTS / sets as usize) {
-                means.extend(held_out.predict_means(known, settings));
+        for number in 0..folds {
+            let number = ONE_IN - 1 - number;
+            if let Some(fold) = Fold::new(bins, number, ONE_IN, TESTS / folds as usize) {
+                means.extend(fold.predict_means(data, settings));
             }
         }
         let noise_variance = settings.noise_variance;
@@ -129,10 +113,10 @@ impl Calibration {
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.
-    fn from_means(means: &[Mean], noise_variance: f32) -> Self {
+    fn from_means(means: &[MeanPrediction], noise_variance: f32) -> Self {
         let mut logs: Vec<f32> = means.iter().map(|m| mean(m.first.log)).collect();
         logs.sort_by(f32::total_cmp);
-        // The brightest tenth of all is about half of the bins that a hold-out picks.
+        // The brightest tenth of all is about half of the bins that a fold tests.
         let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
         let noise = BinNoise::new(means, noise_variance);
         let mut calibration = Self {
@@ -140,14 +124,14 @@ impl Calibration {
             bright,
             noise,
         };
-        let all: Vec<&Mean> = means.iter().collect();
+        let all: Vec<&MeanPrediction> = means.iter().collect();
         for part in 0..4 {
-            let of_part = |m: &&Mean| {
+            let of_part = |m: &&MeanPrediction| {
                 let bin = m.first.bin;
                 let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
                 calibration.part(light, view, m.first.log) == part
             };
-            let own: Vec<&Mean> = all.iter().copied().filter(of_part).collect();
+            let own: Vec<&MeanPrediction> = all.iter().copied().filter(of_part).collect();
             let enough = own.len() >= CLASS_MIN;
             calibration.parts[part] = Classes::new(if enough { &own } else { &all }, &noise);
         }
@@ -171,8 +155,8 @@ impl Calibration {
         variance.map(|v| factor * v.max(0.0).sqrt())
     }
 
-    /// Whether a held-out bin lies within the 95 % interval of its prediction, the noise of its own
-    /// samples included; of the channels that can be told.
+    /// Whether a left-out bin lies within the 95 % interval of its prediction, the noise of its own
+    /// samples included; of the channels that have a residual.
     pub fn covers<'a>(&'a self, prediction: &'a Prediction) -> impl Iterator<Item = bool> + 'a {
         let bin = prediction.bin;
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
@@ -186,8 +170,8 @@ impl Calibration {
 }
 
 impl BinNoise {
-    /// Finds the factor on bins that tell of noise alone; without enough of them it is 1.
-    fn new(means: &[Mean], variance: f32) -> Self {
+    /// Finds the factor on bins that show noise alone; without enough of them it is 1.
+    fn new(means: &[MeanPrediction], variance: f32) -> Self {
         let stated = Self {
             variance,
             factor: 1.0,
@@ -205,7 +189,7 @@ impl BinNoise {
             .map(|(noise, error, limit)| (limit - error) / noise)
             .collect();
         let enough = factors.len() >= 3 * CLASS_MIN;
-        let factor = enough.then(|| percentile_95(&mut factors)).flatten();
+        let factor = enough.then(|| quantile(&mut factors, 0.95)).flatten();
         Self {
             factor: factor.unwrap_or(1.0).clamp(0.5, 2.0),
             ..stated
@@ -246,7 +230,10 @@ impl Residual {
     }
 
     /// Those of the channels of a mean.
-    fn of_mean<'a>(mean: &'a Mean, noise: &'a BinNoise) -> impl Iterator<Item = Self> + 'a {
+    fn of_mean<'a>(
+        mean: &'a MeanPrediction,
+        noise: &'a BinNoise,
+    ) -> impl Iterator<Item = Self> + 'a {
         let count = mean.bins.len() as f32;
         (0..3).filter_map(move |c| {
             let sum: f32 = mean.bins.iter().map(|bin| noise.of(bin, c)).sum();
@@ -256,9 +243,9 @@ impl Residual {
 }
 
 impl Classes {
-    fn new(means: &[&Mean], noise: &BinNoise) -> Self {
-        let size = |m: &Mean| size(m.first.variance);
-        let mut sorted: Vec<&Mean> = means.to_vec();
+    fn new(means: &[&MeanPrediction], noise: &BinNoise) -> Self {
+        let size = |m: &MeanPrediction| size(m.first.variance);
+        let mut sorted: Vec<&MeanPrediction> = means.to_vec();
         sorted.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let length = sorted.len().div_ceil(SIZES).max(CLASS_MIN);
         let mut limits = Vec::new();
@@ -299,9 +286,9 @@ impl Classes {
 
 /// The factor with which 95 % of the residuals lie within 1.96 standard errors: of each residual the
 /// square of the factor that just reaches it, and of these the 95th percentile; then the mean of that
-/// and of the usual one, each weighted by how sure it is. Of residuals that are nearly all noise, the
-/// percentile tells nothing.
-fn factor_of(class: &[&Mean], noise: &BinNoise) -> f32 {
+/// and of the usual one, weighted by their uncertainties. Of residuals that are nearly all noise, the
+/// percentile says nothing.
+fn factor_of(class: &[&MeanPrediction], noise: &BinNoise) -> f32 {
     let all: Vec<Residual> = class
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
@@ -311,7 +298,7 @@ fn factor_of(class: &[&Mean], noise: &BinNoise) -> f32 {
         .map(|r| (r.limit - r.noise) / r.variance)
         .collect();
     let usual = USUAL_FACTOR * USUAL_FACTOR;
-    let Some(square) = percentile_95(&mut squares) else {
+    let Some(square) = quantile(&mut squares, 0.95) else {
         return USUAL_FACTOR;
     };
     let sum = |of: fn(&Residual) -> f32| all.iter().map(of).sum::<f32>();
@@ -319,15 +306,9 @@ fn factor_of(class: &[&Mean], noise: &BinNoise) -> f32 {
     // The channels of a bin share their error: they count as one.
     let by_chance = PERCENTILE_SPREAD * (1.0 + noise_share) / (class.len() as f32).sqrt();
     let by_noise = NOISE_SPREAD * noise_share;
-    let doubt = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
-    let weight = 1.0 / (1.0 + doubt);
+    let uncertainty = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
+    let weight = 1.0 / (1.0 + uncertainty);
     (weight * square.max(0.0) + (1.0 - weight) * usual).sqrt()
-}
-
-fn percentile_95(values: &mut [f32]) -> Option<f32> {
-    let rank = (0.95 * values.len() as f32) as usize;
-    let rank = rank.min(values.len().checked_sub(1)?);
-    Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 fn size(variance: [f32; 3]) -> f32 {
@@ -336,88 +317,4 @@ fn size(variance: [f32; 3]) -> f32 {
 
 fn mean(log: [f32; 3]) -> f32 {
     log.iter().sum::<f32>() / 3.0
-}
-
-/// Which cells are beyond all that was measured: beyond the pairs of elevations (for each elevation of
-/// one direction, the highest of the other), or in a gap of the directions.
-struct Reach {
-    n_phi: usize,
-    /// By row of the grid: one more than the highest row measured with this row or a higher one.
-    rows: Vec<usize>,
-    /// By direction: whether one near it was measured as light, and as view.
-    near: [Vec<bool>; 2],
-}
-
-/// A direction farther than this from all measured ones lies in a gap: the paper's plan has steps of
-/// 15°, and each frame spans some degrees.
-const GAP_DEG: f64 = 15.0;
-
-impl Reach {
-    fn new(bins: &Bins) -> Self {
-        let grid = bins.grid();
-        let n_phi = grid.n_phi();
-        let mut rows = vec![0; grid.n_theta()];
-        let mut measured = [(); 2].map(|()| vec![false; grid.n_directions()]);
-        for bin in bins.bins() {
-            let (light, view) = grid.light_and_view(bin.cell as usize);
-            let (i, v) = (light / n_phi, view / n_phi);
-            rows[i] = rows[i].max(v + 1);
-            rows[v] = rows[v].max(i + 1);
-            measured[0][light] = true;
-            measured[1][view] = true;
-        }
-        for row in (1..rows.len()).rev() {
-            rows[row - 1] = rows[row - 1].max(rows[row]);
-        }
-        let near = measured.map(|measured| near(grid, &measured));
-        Self { n_phi, rows, near }
-    }
-
-    fn origin(&self, light: usize, view: usize) -> Origin {
-        let [lights, views] = &self.near;
-        let no_gap = lights[light] && views[view] || lights[view] && views[light];
-        if no_gap && view / self.n_phi < self.rows[light / self.n_phi] {
-            Origin::Interpolated
-        } else {
-            Origin::Extrapolated
-        }
-    }
-}
-
-/// The directions within a gap's width of a measured one.
-fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
-    let vector = |d: usize| grid.direction(d).to_vec3();
-    let known: Vec<Vec3> = (0..measured.len())
-        .filter(|d| measured[*d])
-        .map(vector)
-        .collect();
-    let closest = GAP_DEG.to_radians().cos();
-    (0..measured.len())
-        .into_par_iter()
-        .map(|d| {
-            let here = vector(d);
-            measured[d] || known.iter().any(|k| dot(*k, here) >= closest)
-        })
-        .collect()
-}
-
-/// Where each cell's value comes from, as an [`Origin`] a cell.
-pub fn origins(bins: &Bins) -> Vec<u8> {
-    let grid = bins.grid();
-    let (reach, n) = (Reach::new(bins), grid.n_directions());
-    let mut origins: Vec<u8> = (0..n)
-        .into_par_iter()
-        .flat_map_iter(|light| {
-            let reach = &reach;
-            (0..n).map(move |view| reach.origin(light, view) as u8)
-        })
-        .collect();
-    for bin in bins.bins() {
-        let (light, view) = grid.light_and_view(bin.cell as usize);
-        origins[grid.cell(view, light)] = Origin::Reciprocal as u8;
-    }
-    for bin in bins.bins() {
-        origins[bin.cell as usize] = Origin::Measured as u8;
-    }
-    origins
 }

@@ -60,8 +60,8 @@ fn exponential<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     // The whole number becomes an exponent.
     let bias = simd.splat_u32s(127u32.wrapping_sub(WHOLE.to_bits()));
     let exponent = simd.add_u32s(simd.transmute_u32s_f32s(shifted), bias);
-    let power = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(23));
-    simd.mul_f32s(e, simd.transmute_f32s_u32s(power))
+    let exponent = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(23));
+    simd.mul_f32s(e, simd.transmute_f32s_u32s(exponent))
 }
 
 #[cfg(test)]

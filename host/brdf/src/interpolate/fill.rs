@@ -1,18 +1,20 @@
 //! All cells, block by block.
 
-use super::Settings;
+use super::FillSettings;
 use super::blend::{Corners, Shifts};
-use super::error_bars::{Calibration, ErrorBars, origins};
+use super::data::Data;
+use super::error_bars::{Calibration, ErrorBars};
 use super::exponential::exponentials;
-use super::known::Known;
-use super::levels::Levels;
+use super::hierarchy::Hierarchy;
+use super::origin::origins;
 use super::patches::{Cover, Patch, cover};
-use super::refine::Refiner;
+use super::planes::{Planes, SharedPlanes};
+use super::refine::{Refiner, Solved};
 use crate::dense::DenseBrdf;
 use crate::grid::Grid;
 use pulp::Arch;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Fewer filled bins than this say nothing about a four-dimensional function.
 pub const MIN_BINS: usize = 8;
@@ -26,28 +28,34 @@ pub enum FillError {
 }
 
 /// Interpolates every cell of the bins' grid. Positive, finite, exactly reciprocal, one value a
-/// pole. `progress` is told the share done, 0 ..= 1, from any thread.
+/// pole. `progress` is called with the share done, 0 ..= 1, from any thread.
+///
+/// # Errors
+/// Too few bins.
 pub fn fill(
-    known: &Known,
-    settings: &Settings,
+    data: &Data,
+    settings: &FillSettings,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<DenseBrdf, FillError> {
     Ok(DenseBrdf::from_planes(
-        known.bins().grid(),
-        solve(known, settings, None, progress)?.0,
+        data.bins().grid(),
+        solve(data, settings, None, progress)?.0,
     ))
 }
 
 /// The same with a standard error for each cell. It takes about twice the time.
+///
+/// # Errors
+/// Too few bins.
 pub fn fill_with_errors(
-    known: &Known,
-    settings: &Settings,
+    data: &Data,
+    settings: &FillSettings,
     calibration: &Calibration,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(DenseBrdf, ErrorBars), FillError> {
-    let bins = known.bins();
+    let bins = data.bins();
     let grid = bins.grid();
-    let (values, standard_error) = solve(known, settings, Some(calibration), progress)?;
+    let (values, standard_error) = solve(data, settings, Some(calibration), progress)?;
     let bars = ErrorBars {
         standard_error,
         origin: origins(bins),
@@ -55,33 +63,29 @@ pub fn fill_with_errors(
     Ok((DenseBrdf::from_planes(grid, values), bars))
 }
 
-type Planes = [Vec<f32>; 3];
-
 /// Values of all cells, and with a calibration their standard errors (else planes of no length).
 fn solve(
-    known: &Known,
-    settings: &Settings,
+    data: &Data,
+    settings: &FillSettings,
     calibration: Option<&Calibration>,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<(Planes, Planes), FillError> {
-    let fit = Fit::new(known, settings)?;
-    let (grid, patches) = (fit.grid, &fit.cover.patches);
+    let task = Task::new(data, settings)?;
+    let (grid, patches) = (task.grid, &task.cover.patches);
     let values = SharedPlanes::new(grid.n_cells());
     let errors = SharedPlanes::new(calibration.map_or(0, |_| grid.n_cells()));
     // First the logarithms of the cells of each pair, and their relative errors.
-    let corners = fit.solve_pairs(calibration.is_some(), progress, &|refiner, p, q| {
-        let logs = refiner.logs();
-        if !refiner.is_smooth() {
-            values.store(grid, (p, q), logs);
+    let corners = task.solve_pairs(calibration.is_some(), progress, &|solved, (p, q)| {
+        if !solved.is_smooth {
+            values.store(grid, (p, q), solved.cells);
         }
         if let Some(calibration) = calibration {
-            let variances = refiner.variances();
             let directions = p
                 .vectors
                 .iter()
                 .flat_map(|light| q.vectors.iter().map(move |view| (*light, *view)));
             let relative: Vec<[f32; 3]> = directions
-                .zip(logs.iter().zip(variances))
+                .zip(solved.cells.iter().zip(solved.variances))
                 .map(|((light, view), (log, variance))| {
                     calibration.standard_error(light, view, *log, *variance)
                 })
@@ -89,7 +93,7 @@ fn solve(
             errors.store(grid, (p, q), &relative);
         }
     });
-    // Then, with what the neighbours say, the values.
+    // Then, shifted to what they agree on with their neighbours, the values.
     (0..patches.len())
         .into_par_iter()
         .with_max_len(1)
@@ -99,7 +103,7 @@ fn solve(
                 if !corners.is_smooth(p, q) {
                     values.load(grid, pair, &mut work.logs);
                 }
-                corners.blend(&fit.cover, (p, q), &mut work.logs, &mut work.shifts);
+                corners.blend(&task.cover, (p, q), &mut work.logs, &mut work.shifts);
                 exponentials(work.arch, &mut work.logs);
                 values.store_both(grid, pair, &work.logs);
                 if calibration.is_some() {
@@ -115,17 +119,17 @@ fn solve(
 }
 
 /// What a fill is made of.
-pub(super) struct Fit<'a> {
+pub(super) struct Task<'a> {
     pub grid: Grid,
-    pub settings: &'a Settings,
-    known: &'a Known<'a>,
-    moved: Option<Levels>,
+    pub settings: &'a FillSettings,
+    data: &'a Data<'a>,
+    moved: Option<Hierarchy>,
     pub cover: Cover,
 }
 
-impl<'a> Fit<'a> {
-    pub(super) fn new(known: &'a Known, settings: &'a Settings) -> Result<Self, FillError> {
-        let bins = known.bins();
+impl<'a> Task<'a> {
+    pub(super) fn new(data: &'a Data, settings: &'a FillSettings) -> Result<Self, FillError> {
+        let bins = data.bins();
         if bins.bins().len() < MIN_BINS {
             return Err(FillError::TooFewBins(bins.bins().len()));
         }
@@ -133,39 +137,41 @@ impl<'a> Fit<'a> {
         Ok(Self {
             grid,
             settings,
-            known,
-            moved: known.moved(settings.coordinates),
+            data,
+            moved: data.moved(settings.coordinates),
             cover: cover(grid, &settings.patch_sizes_deg()),
         })
     }
 
-    /// The nodes, in the coordinates of the settings.
-    pub(super) fn levels(&self) -> &Levels {
-        self.moved.as_ref().unwrap_or(self.known.levels())
+    /// The data, in the coordinates of the settings.
+    pub(super) fn hierarchy(&self) -> &Hierarchy {
+        self.moved.as_ref().unwrap_or(self.data.hierarchy())
     }
 
-    /// Solves all pairs of patches, shows each to `each`, and averages at their corners.
+    /// Solves all pairs of patches, gives each to `each`, and averages at their corners.
     pub(super) fn solve_pairs(
         &self,
         with_variances: bool,
         progress: &(dyn Fn(f64) + Sync),
-        each: &(dyn Fn(&Refiner, &Patch, &Patch) + Sync),
+        each: &(dyn Fn(Solved<'_>, (&Patch, &Patch)) + Sync),
     ) -> Corners {
         let patches = &self.cover.patches;
         let pairs = patches.len() * (patches.len() + 1) / 2;
         let done = AtomicUsize::new(0);
+        let refiner = || Refiner::new(self.settings);
         let at_corners = (0..patches.len())
             .into_par_iter()
             // Early patches have the most partners; hand them out one by one.
             .with_max_len(1)
-            .map_init(Refiner::default, |refiner, p| {
-                refiner.with_variances = with_variances;
+            .map_init(refiner, |refiner, p| {
                 let (mut at_corners, mut smooth) = (Vec::new(), Vec::new());
                 for q in &patches[p..] {
-                    refiner.solve(self.levels(), self.settings, &patches[p], q);
-                    at_corners.extend_from_slice(refiner.corners());
-                    smooth.push(refiner.is_smooth());
-                    each(refiner, &patches[p], q);
+                    let pair = (&patches[p], q);
+                    let solved =
+                        refiner.solve(self.hierarchy(), self.settings, pair, with_variances);
+                    at_corners.extend_from_slice(solved.corners);
+                    smooth.push(solved.is_smooth);
+                    each(solved, pair);
                 }
                 let before = done.fetch_add(patches.len() - p, Relaxed);
                 progress((before + patches.len() - p) as f64 / pairs as f64);
@@ -183,111 +189,6 @@ struct Blended {
     errors: Vec<[f32; 3]>,
     shifts: Shifts,
     arch: Arch,
-}
-
-/// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
-/// spare an argument about which thread owns which row.
-struct SharedPlanes([Vec<AtomicU32>; 3]);
-
-impl SharedPlanes {
-    fn new(length: usize) -> Self {
-        let plane = || (0..length).into_par_iter().map(|_| AtomicU32::new(0));
-        Self([(); 3].map(|()| plane().collect()))
-    }
-
-    /// Stores the cells of a pair, light by light.
-    fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
-        let width = q.directions.len();
-        for (light, row) in p.directions.iter().zip(cells.chunks_exact(width)) {
-            for (first, view, length) in runs(q) {
-                let cells = &row[first..first + length];
-                self.store_run(grid.cell(*light as usize, view), cells.iter());
-            }
-        }
-    }
-
-    /// What [`Self::store`] stored.
-    fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; 3]>) {
-        cells.clear();
-        for light in &p.directions {
-            for (_, view, length) in runs(q) {
-                let from = grid.cell(*light as usize, view);
-                let planes = [0, 1, 2].map(|c| &self.0[c][from..from + length]);
-                cells.extend(
-                    (0..length).map(|k| planes.map(|p| f32::from_bits(p[k].load(Relaxed)))),
-                );
-            }
-        }
-    }
-
-    /// Stores the cells of a pair and their mirror images. Within one patch both orders of a pair are
-    /// there; the first serves for both.
-    fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
-        self.store(grid, (p, q), cells);
-        let (same, width) = (std::ptr::eq(p, q), q.directions.len());
-        for (b, view) in q.directions.iter().enumerate() {
-            for (first, light, length) in runs(p) {
-                let length = if same {
-                    length.min((b + 1).saturating_sub(first))
-                } else {
-                    length
-                };
-                let column = cells.iter().skip(first * width + b).step_by(width);
-                self.store_run(grid.cell(*view as usize, light), column.take(length));
-            }
-        }
-    }
-
-    /// Stores cells that follow each other.
-    fn store_run<'a>(&self, from: usize, cells: impl ExactSizeIterator<Item = &'a [f32; 3]>) {
-        let [red, green, blue] = [0, 1, 2].map(|c| &self.0[c][from..from + cells.len()]);
-        for (k, cell) in cells.enumerate() {
-            red[k].store(cell[0].to_bits(), Relaxed);
-            green[k].store(cell[1].to_bits(), Relaxed);
-            blue[k].store(cell[2].to_bits(), Relaxed);
-        }
-    }
-
-    fn into_planes(self, grid: Grid) -> Planes {
-        self.0.map(|plane| {
-            // Same size and alignment: the vector is reused in place.
-            let mut plane: Vec<f32> = plane
-                .into_iter()
-                .map(|bits| f32::from_bits(bits.into_inner()))
-                .collect();
-            spread_poles(grid, &mut plane);
-            plane
-        })
-    }
-}
-
-/// Directions of a patch that follow each other: where the first stands in the patch, its number, and how
-/// many they are.
-fn runs(patch: &Patch) -> impl Iterator<Item = (usize, usize, usize)> {
-    let mut first = 0;
-    patch
-        .directions
-        .chunk_by(|a, b| a + 1 == *b)
-        .map(move |run| {
-            let place = first;
-            first += run.len();
-            (place, run[0] as usize, run.len())
-        })
-}
-
-/// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
-pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
-    if plane.is_empty() {
-        return;
-    }
-    let (n, n_phi) = (grid.n_directions(), grid.n_phi());
-    for row in plane.chunks_exact_mut(n) {
-        let pole = row[0];
-        row[1..n_phi].fill(pole);
-    }
-    for row in 1..n_phi {
-        plane.copy_within(0..n, row * n);
-    }
 }
 
 #[cfg(test)]
@@ -337,11 +238,11 @@ mod tests {
         let bins = Bins::new(fine, &samples(&model, 60_000));
         let coarse = Bins::new(grid, &samples(&model, 60_000));
         assert!(coarse.bins().len() < bins.bins().len());
-        let settings = Settings {
+        let settings = FillSettings {
             block_deg: 20.0,
-            ..Settings::DEFAULT
+            ..FillSettings::DEFAULT
         };
-        let dense = fill(&Known::new(&coarse), &settings, &|_| ()).unwrap();
+        let dense = fill(&Data::new(&coarse), &settings, &|_| ()).unwrap();
         let n = grid.n_directions();
         let mut sum = 0.0;
         for light in 0..n {
@@ -368,7 +269,7 @@ mod tests {
         let model = Kurt::white_reference_fabric();
         let bins = Bins::new(Grid::PAPER, &samples(&model, 7));
         assert_eq!(
-            fill(&Known::new(&bins), &Settings::DEFAULT, &|_| ()),
+            fill(&Data::new(&bins), &FillSettings::DEFAULT, &|_| ()),
             Err(FillError::TooFewBins(7))
         );
     }

@@ -1,78 +1,16 @@
 //! The cells of a pair of patches from what its block gives at the pair's corners.
 //!
-//! A coarse block that need not be cut is smooth, and cells lie close, near the pole above all: the
-//! values at some two hundred pairs of corners, which blending needs in any case, tell those of some
+//! A coarse block that need not be refined is smooth, and cells lie close, near the pole above all: from
+//! the values at some two hundred pairs of corners, which blending needs in any case, follow those of some
 //! six hundred cells (and of hundreds of thousands around the pole), for a small part of what it costs
-//! to ask the block itself. Between the corners of a patch values are kriged with a Gaussian kernel
-//! much wider than the patch, which is as good as a polynomial through as many points as there are, and
-//! asks nothing of how they lie. [`FromCorners::is_smooth`] says whether that is enough.
+//! to evaluate the block itself. [`FromCorners::largest_difference`] says whether that is enough.
 
+use super::corner_weights::{PAD, Weights};
 use super::patches::Patch;
-use crate::direction::Vec3;
-use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
-/// Range of the kernel in radii of the patch. With 2 even a linear function was off by a hundredth of its range.
-const RANGE: f64 = 12.0;
-/// Keeps the matrix of a kernel that wide regular, and the weights small where corners of two rows of patches
-/// all but coincide: in no direction do their absolute values add up to much more than 2.
-const NUGGET: f64 = 1e-7;
-/// The widest vectors in use hold 16 numbers.
-const PAD: usize = 16;
-
-/// How each direction of a patch follows from its corners.
-#[derive(Clone, Debug)]
-pub struct Weights {
-    /// Corner by corner the weights in all directions, padded by zeros.
-    by_corner: Vec<f32>,
-    /// Directions, padded.
-    width: usize,
-}
-
-impl Weights {
-    /// Ordinary kriging from `corners` to `directions`. `None` where there are not more directions than
-    /// corners, and nothing is to be gained.
-    pub fn new(corners: &[Vec3], directions: &[Vec3], centre: Vec3) -> Option<Self> {
-        if directions.len() <= corners.len() {
-            return None;
-        }
-        let distance2 = |a: Vec3, b: Vec3| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
-        let radius2 = corners
-            .iter()
-            .fold(0.0, |r: f64, c| r.max(distance2(*c, centre)));
-        let kernel = |a: Vec3, b: Vec3| (-distance2(a, b) / (RANGE * RANGE * radius2)).exp();
-        let n = corners.len();
-        let matrix = DMatrix::from_fn(n, n, |i, j| {
-            kernel(corners[i], corners[j]) + if i == j { NUGGET } else { 0.0 }
-        });
-        let factor = matrix.cholesky()?;
-        let ones = factor.solve(&DVector::from_element(n, 1.0));
-        let width = directions.len().next_multiple_of(PAD);
-        let mut by_corner = vec![0.0; n * width];
-        for (place, direction) in directions.iter().enumerate() {
-            let mut weights =
-                factor.solve(&DVector::from_fn(n, |i, _| kernel(corners[i], *direction)));
-            // They are to add up to 1.
-            let missing = (1.0 - weights.sum()) / ones.sum();
-            weights += missing * &ones;
-            for (corner, weight) in weights.iter().enumerate() {
-                by_corner[corner * width + place] = *weight as f32;
-            }
-        }
-        Some(Self { by_corner, width })
-    }
-
-    fn corners(&self) -> usize {
-        self.by_corner.len() / self.width
-    }
-
-    fn at(&self, corner: usize, place: usize) -> f32 {
-        self.by_corner[corner * self.width + place]
-    }
-}
-
-/// The weights of both patches, where it is cheaper to go by corners than to ask a block for each
-/// cell.
+/// The weights of both patches, where it is cheaper to go by corners than to evaluate a block at
+/// each cell.
 pub fn weights_of<'a>(p: &'a Patch, q: &'a Patch) -> Option<(&'a Weights, &'a Weights)> {
     let corners = p.corners.len() * q.corners.len();
     let cells = p.directions.len() * q.directions.len();
@@ -246,7 +184,7 @@ fn row_of_cells<S: Simd, const R: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::direction::dot;
+    use crate::direction::{Vec3, dot};
     use crate::grid::Grid;
     use crate::interpolate::patches::cover;
 
@@ -268,7 +206,7 @@ mod tests {
     }
 
     /// The largest error of what the corners give as a share of the function's range there, as found cell by
-    /// cell, and as the block's own cells would tell it.
+    /// cell, and as [`FromCorners::largest_difference`] finds it.
     fn errors(f: fn(Vec3, Vec3) -> [f32; 3], p: &Patch, q: &Patch) -> (f32, f32) {
         let weights = weights_of(p, q).unwrap();
         let mut from = FromCorners::default();
@@ -280,13 +218,13 @@ mod tests {
         let pairs = cells.iter().flatten().zip(truth.iter().flatten());
         let largest = pairs.fold(0.0, |m: f32, (a, b)| m.max((a - b).abs()));
         let (lights, views) = (0..p.vectors.len(), 0..q.vectors.len());
-        let told = from.largest_difference(weights, lights, views, &truth);
+        let found = from.largest_difference(weights, lights, views, &truth);
         let ends = |m: (f32, f32), v: &f32| (m.0.min(*v), m.1.max(*v));
         let (low, high) = truth
             .iter()
             .flatten()
             .fold((f32::INFINITY, f32::NEG_INFINITY), ends);
-        (largest / (high - low), told / (high - low))
+        (largest / (high - low), found / (high - low))
     }
 
     #[test]
@@ -295,18 +233,18 @@ mod tests {
         // The cap around the pole, one beside it, and one in the middle.
         for (p, q) in [(0, 3), (3, 100), (100, 100), (100, 250)] {
             let (p, q) = (&patches[p], &patches[q]);
-            let (written, told) = errors(smooth, p, q);
+            let (written, found) = errors(smooth, p, q);
             assert!(written < 0.001, "{written}");
-            assert!((written - told).abs() < 1e-5, "{written} {told}");
+            assert!((written - found).abs() < 1e-5, "{written} {found}");
         }
         let crossed = patches.iter().find(|p| {
             let x = |d: &Vec3| d[0] - 0.3;
             p.vectors.iter().any(|d| x(d) > 0.02) && p.vectors.iter().any(|d| x(d) < -0.02)
         });
-        let (written, told) = errors(kinked, crossed.unwrap(), &patches[100]);
+        let (written, found) = errors(kinked, crossed.unwrap(), &patches[100]);
         assert!(
-            written > 0.01 && (written - told).abs() < 1e-5,
-            "{written} {told}"
+            written > 0.01 && (written - found).abs() < 1e-5,
+            "{written} {found}"
         );
     }
 

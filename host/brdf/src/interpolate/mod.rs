@@ -12,46 +12,55 @@ pub mod budget;
 pub mod by_rows;
 pub mod cholesky;
 pub mod coordinates;
+pub mod corner_weights;
+pub mod cross_validation;
+pub mod data;
+pub mod datum;
 pub mod error_bars;
 pub mod exponential;
 pub mod fill;
 pub mod from_corners;
-pub mod hold_out;
-pub mod known;
-pub mod levels;
-pub mod nodes;
+pub mod hierarchy;
+pub mod origin;
 pub mod patches;
+pub(crate) mod planes;
 pub mod refine;
 pub mod select;
 
+pub use block::kernel::{AnyKernel, Kernel, Matern32};
 pub use by_rows::ByRows;
 pub use coordinates::Coordinates;
-pub use error_bars::{Calibration, ErrorBars, Origin, origins};
+pub use data::Data;
+pub use error_bars::{Calibration, ErrorBars};
 pub use fill::{FillError, fill, fill_with_errors};
-pub use known::Known;
-pub use select::{Selection, Trial, select};
+pub use origin::{Origin, origins};
+pub use select::{Candidate, Selection, select};
 
 /// How to interpolate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Size of the patches of directions that share a block, degrees; half of it where they are cut.
+pub struct FillSettings {
+    /// Size of the patches of directions that share a block, degrees; half of it where they are refined.
     pub block_deg: f64,
-    /// A block is cut where a finer one differs from it by more than this many standard deviations
-    /// of one sample: 0 cuts everywhere, infinity nowhere.
+    /// A block is refined where a finer one differs from it by more than this many standard deviations
+    /// of one sample: with 0 everywhere, with infinity nowhere.
     pub tolerance: f32,
-    /// What cutting may cost, in fine blocks a pair of patches, on average: [`select`] raises the
+    /// What refinement may cost, in fine blocks a pair of patches, on average: [`select`] raises the
     /// tolerance to it.
     pub budget: f32,
-    /// Nodes a block; three quarters of them where it may be cut.
-    pub nodes: usize,
-    /// Of many bins, one in so many is looked at: for [`Known::thinned`].
+    /// Size of a block's neighbourhood: so many data; three quarters of them in a coarse block that may be
+    /// refined.
+    pub neighbours: usize,
+    /// Of many bins, one in so many is used: for [`Data::thinned`].
     pub one_bin_in: usize,
     /// Where neighbours are looked for.
     pub coordinates: Coordinates,
-    /// Weight of the difference of light and view in the kernel's distances, beside the one in the
-    /// coordinates: which nodes tell most, and how much each tells, are two questions.
+    /// How values correlate by their distance.
+    pub kernel: &'static dyn AnyKernel,
+    /// Weight of the difference of light and view in the kernel's distances. Over the one in the
+    /// coordinates it is the kernel's anisotropy ratio: which data are near, and how much each counts, are
+    /// two questions.
     pub kernel_weight: f64,
-    /// Range of the kernel in radii of the neighbourhood; at least 3.5.
+    /// Range of the kernel in radii of the neighbourhood; raised to [`Kernel::range_min`].
     pub range: f32,
     /// Variance of the natural logarithm of one sample.
     pub noise_variance: f32,
@@ -64,7 +73,7 @@ pub struct Settings {
 pub enum Preset {
     /// A first look.
     Preview,
-    /// Two thirds of the work of the default.
+    /// Two thirds of the work of the default (0.61 to 0.67 of its CPU time on the paper's plan).
     Fast,
     /// Accurate to the noise on most materials.
     Default,
@@ -87,20 +96,21 @@ impl Preset {
     }
 
     /// Its settings; [`select`] chooses the coordinates and measures the noise.
-    pub const fn settings(self) -> Settings {
-        let (block_deg, tolerance, budget, nodes, one_bin_in) = match self {
+    pub const fn settings(self) -> FillSettings {
+        let (block_deg, tolerance, budget, neighbours, one_bin_in) = match self {
             Preset::Preview => (10.0, f32::INFINITY, 0.0, 64, 8),
             Preset::Fast => (8.0, 1.0, 3.0, 64, 1),
             Preset::Default => (8.0, 0.7, 8.0, 128, 1),
             Preset::Best => (8.0, 0.5, f32::INFINITY, 256, 1),
         };
-        Settings {
+        FillSettings {
             block_deg,
             tolerance,
             budget,
-            nodes,
+            neighbours,
             one_bin_in,
-            coordinates: known::SORTED_IN,
+            coordinates: data::SORTED_IN,
+            kernel: &Matern32,
             kernel_weight: 0.3,
             range: 8.0,
             noise_variance: 1e-4,
@@ -109,27 +119,27 @@ impl Preset {
     }
 }
 
-impl Settings {
+impl FillSettings {
     /// What suits most materials; [`select`] finds what suits one.
-    pub const DEFAULT: Settings = Preset::Default.settings();
+    pub const DEFAULT: FillSettings = Preset::Default.settings();
 
-    /// Sizes of the patches, coarse to fine, degrees. Where none are cut, the corners of the fine ones
+    /// Sizes of the patches, coarse to fine, degrees. Where none are refined, the corners of the fine ones
     /// still serve to blend the coarse.
     fn patch_sizes_deg(&self) -> [f64; 2] {
         [self.block_deg, 0.5 * self.block_deg]
     }
 
-    /// Whether pairs of patches may be cut.
-    fn cuts(&self) -> bool {
+    /// Whether pairs of patches may be refined.
+    fn refines(&self) -> bool {
         self.tolerance.is_finite()
     }
 
-    /// Nodes of a coarse block. Where finer ones may take its place, it needs no more to know where they must.
-    fn coarse_nodes(&self) -> usize {
-        if self.cuts() {
-            3 * self.nodes / 4
+    /// Data of a coarse block. Where finer ones may take its place, it needs no more to find where they must.
+    fn coarse_neighbours(&self) -> usize {
+        if self.refines() {
+            3 * self.neighbours / 4
         } else {
-            self.nodes
+            self.neighbours
         }
     }
 
@@ -146,26 +156,27 @@ impl Settings {
     fn block(&self) -> block::BlockSettings {
         block::BlockSettings {
             range: self.range,
-            stretch: (self.kernel_weight / self.coordinates.weight) as f32,
+            anisotropy: (self.kernel_weight / self.coordinates.weight) as f32,
             noise_variance: self.noise_variance,
             nugget_min: self.nugget_min,
-            trend: self.coordinates.trend(),
+            drift: self.coordinates.drift(),
         }
     }
 }
 
-/// Two fits through different nodes never agree better than this, whatever the samples' noise.
+/// Two fits through different data never agree better than this, whatever the samples' noise.
 const NOISE_MIN: f32 = 0.003;
 
-impl std::fmt::Display for Settings {
+impl std::fmt::Display for FillSettings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "blocks of {} deg, tolerance {:.2} noise, {} nodes, {}, kernel w={}, range {} radii, noise {:.2} %, nugget at least {:e}",
+            "blocks of {} deg, tolerance {:.2} noise, {} data, {}, kernel {} w={}, range {} radii, noise {:.2} %, nugget at least {:e}",
             self.block_deg,
             self.tolerance,
-            self.nodes,
+            self.neighbours,
             self.coordinates,
+            self.kernel.name(),
             self.kernel_weight,
             self.range,
             100.0 * self.noise_variance.sqrt(),

@@ -1,11 +1,11 @@
-//! The grid's directions, cut into patches of about the same size on the sphere, and these into
+//! The grid's directions, divided into patches of about the same size on the sphere, and these into
 //! smaller ones. The cells of a pair of patches share one factorisation.
 //!
 //! Patches meet at *corners*, half a step between cells. Along the border of two rows of patches lie
 //! the corners of both, so that what is linear between the corners of an edge is the same seen from
 //! either side.
 
-use super::from_corners::Weights;
+use super::corner_weights::Weights;
 use crate::direction::{Direction, Vec3, normalize};
 use crate::grid::Grid;
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ pub struct Patch {
     /// and in parts.
     pub weights: Option<Weights>,
     /// Smaller patches of the same directions; none where the patch is of the smallest size.
-    pub children: Vec<Child>,
+    pub parts: Vec<Part>,
     rows: Range<usize>,
     columns: Range<usize>,
 }
@@ -48,7 +48,7 @@ pub type Between = [(u32, f32); 4];
 
 /// A part of a patch.
 #[derive(Clone, Debug)]
-pub struct Child {
+pub struct Part {
     /// The part as a patch of its own.
     pub patch: Patch,
     /// Where each of its directions stands in the parent.
@@ -57,10 +57,10 @@ pub struct Child {
     pub corner_places: Vec<u32>,
 }
 
-/// Covers the grid with patches of about `sizes_deg[0]` × `sizes_deg[0]`, each cut into parts of
+/// Covers the grid with patches of about `sizes_deg[0]` × `sizes_deg[0]`, each divided into parts of
 /// about the next size, and so on. Every direction is in one patch of each size, the pole once.
 pub fn cover(grid: Grid, sizes_deg: &[f64]) -> Cover {
-    let mut patches = cut(grid, 0..grid.n_theta(), 0..grid.n_phi(), sizes_deg);
+    let mut patches = divide(grid, 0..grid.n_theta(), 0..grid.n_phi(), sizes_deg);
     let mut edges = Edges::default();
     patches.iter().for_each(|patch| edges.add(grid, patch));
     let corners = edges.number(grid);
@@ -72,8 +72,8 @@ pub fn cover(grid: Grid, sizes_deg: &[f64]) -> Cover {
     Cover { patches, corners }
 }
 
-/// Cuts a lattice of rows and columns into patches.
-fn cut(grid: Grid, rows: Range<usize>, columns: Range<usize>, sizes_deg: &[f64]) -> Vec<Patch> {
+/// Divides a lattice of rows and columns into patches.
+fn divide(grid: Grid, rows: Range<usize>, columns: Range<usize>, sizes_deg: &[f64]) -> Vec<Patch> {
     let Some((size_deg, smaller)) = sizes_deg.split_first() else {
         return Vec::new();
     };
@@ -119,9 +119,9 @@ fn patch(grid: Grid, rows: Range<usize>, columns: Range<usize>, smaller_deg: &[f
             centre[k] += v[k];
         }
     }
-    let children = cut(grid, rows.clone(), columns.clone(), smaller_deg)
+    let parts = divide(grid, rows.clone(), columns.clone(), smaller_deg)
         .into_iter()
-        .map(|patch| Child {
+        .map(|patch| Part {
             places: places_of(&patch.directions, &directions),
             corner_places: Vec::new(),
             patch,
@@ -135,7 +135,7 @@ fn patch(grid: Grid, rows: Range<usize>, columns: Range<usize>, smaller_deg: &[f
         corner_vectors: Vec::new(),
         between: Vec::new(),
         weights: None,
-        children,
+        parts,
         rows,
         columns,
     }
@@ -144,8 +144,8 @@ fn patch(grid: Grid, rows: Range<usize>, columns: Range<usize>, smaller_deg: &[f
 fn give_vectors(corners: &[Vec3], patch: &mut Patch) {
     let vectors = patch.corners.iter().map(|c| corners[*c as usize]);
     patch.corner_vectors = vectors.collect();
-    for child in &mut patch.children {
-        give_vectors(corners, &mut child.patch);
+    for part in &mut patch.parts {
+        give_vectors(corners, &mut part.patch);
     }
 }
 
@@ -163,8 +163,8 @@ struct Edges(BTreeMap<usize, (Vec<usize>, u32)>);
 
 impl Edges {
     fn add(&mut self, grid: Grid, patch: &Patch) {
-        if !patch.children.is_empty() {
-            patch.children.iter().for_each(|c| self.add(grid, &c.patch));
+        if !patch.parts.is_empty() {
+            patch.parts.iter().for_each(|c| self.add(grid, &c.patch));
             return;
         }
         for row in [patch.rows.start, patch.rows.end] {
@@ -194,22 +194,22 @@ impl Edges {
     }
 
     fn give_corners(&self, grid: Grid, patch: &mut Patch) {
-        if patch.children.is_empty() {
+        if patch.parts.is_empty() {
             self.give_leaf_corners(grid, patch);
             return;
         }
-        for child in &mut patch.children {
-            self.give_corners(grid, &mut child.patch);
-            patch.corners.extend(&child.patch.corners);
+        for part in &mut patch.parts {
+            self.give_corners(grid, &mut part.patch);
+            patch.corners.extend(&part.patch.corners);
         }
         patch.corners.sort_unstable();
         patch.corners.dedup();
         patch.between = vec![[(0, 0.0); 4]; patch.directions.len()];
-        for child in &mut patch.children {
-            child.corner_places = places_of(&child.patch.corners, &patch.corners);
-            for (place, between) in child.places.iter().zip(&child.patch.between) {
+        for part in &mut patch.parts {
+            part.corner_places = places_of(&part.patch.corners, &patch.corners);
+            for (place, between) in part.places.iter().zip(&part.patch.between) {
                 let in_parent =
-                    |(corner, weight): (u32, f32)| (child.corner_places[corner as usize], weight);
+                    |(corner, weight): (u32, f32)| (part.corner_places[corner as usize], weight);
                 patch.between[*place as usize] = between.map(in_parent);
             }
         }
@@ -300,7 +300,7 @@ mod tests {
             check(grid, &patches.iter().collect::<Vec<_>>(), sizes[0]);
             let parts: Vec<&Patch> = patches
                 .iter()
-                .flat_map(|p| p.children.iter().map(|c| &c.patch))
+                .flat_map(|p| p.parts.iter().map(|c| &c.patch))
                 .collect();
             check(grid, &parts, sizes[1]);
         }
@@ -309,12 +309,12 @@ mod tests {
     #[test]
     fn a_part_knows_its_places_in_the_whole() {
         for patch in cover(Grid::PAPER, &[8.0, 4.0]).patches {
-            for child in &patch.children {
-                assert!(child.patch.children.is_empty());
-                for (place, direction) in child.places.iter().zip(&child.patch.directions) {
+            for part in &patch.parts {
+                assert!(part.patch.parts.is_empty());
+                for (place, direction) in part.places.iter().zip(&part.patch.directions) {
                     assert_eq!(patch.directions[*place as usize], *direction);
                 }
-                for (place, corner) in child.corner_places.iter().zip(&child.patch.corners) {
+                for (place, corner) in part.corner_places.iter().zip(&part.patch.corners) {
                     assert_eq!(patch.corners[*place as usize], *corner);
                 }
             }

@@ -6,6 +6,7 @@ pub mod kurt;
 pub mod lambert;
 pub mod material;
 pub mod microcylinder;
+pub mod shading;
 pub mod ward;
 
 pub use ggx::Ggx;
@@ -16,7 +17,7 @@ pub use microcylinder::{Microcylinder, Reciprocal, Thread};
 pub use ward::Ward;
 
 use crate::direction::{Vec3, normalize};
-use crate::shading::{Frame, Light, shade_one_by_one};
+use shading::{Light, TangentFrame, shade_one_by_one};
 
 /// A BRDF in 1/sr, per channel.
 pub trait Brdf: Send + Sync {
@@ -26,7 +27,7 @@ pub trait Brdf: Send + Sync {
 
     /// The radiance towards a viewer, in the direction `viewer`, of each of many points of a surface
     /// under the same lights; none where the viewer is behind the surface.
-    fn shade(&self, points: &[Frame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
+    fn shade(&self, points: &[TangentFrame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
         shade_one_by_one(self, points, lights, viewer)
     }
 }

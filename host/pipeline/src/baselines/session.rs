@@ -7,8 +7,8 @@ use crate::fill::{FillOptions, fill};
 use crate::fit::{FitResult, cells_of_dense, fit_model};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
-use gonia_brdf::cellwise::CellSettings;
-use gonia_brdf::fit::{Family, Settings as FitSettings};
+use gonia_brdf::baselines::BaselineSettings;
+use gonia_brdf::fit::{FitSettings, StandardFamily};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use gonia_formats::rivals_toml::{Rival, Rivals};
 use gonia_render::Tabulated;
@@ -149,7 +149,10 @@ impl Measurement {
         let what = "simulated strips on a cylinder";
         keep(rival, self.made("strips", strips, what))?;
 
-        for family in [Family::Kurt { lobes: 2 }, Family::Sadeghi { scaled: false }] {
+        for family in [
+            StandardFamily::Kurt { lobes: 2 },
+            StandardFamily::Sadeghi { scaled: false },
+        ] {
             let (rival, result) = self.fitted(family, &options.fits, progress)?;
             keep(rival, Made::Fitted(result, self.dense.scale))?;
         }
@@ -184,7 +187,7 @@ impl Measurement {
         let start = Instant::now();
         let table = step(progress, Step::PaperMethod, |_| {
             let bins = Bins::new(self.own_grid, samples);
-            fill_check_cells(&bins, &CellSettings::PAPER, grid).map_err(Error::from)
+            fill_check_cells(&bins, &BaselineSettings::PAPER, grid).map_err(Error::from)
         })?;
         // As if all cells took as long.
         let share = distinct(self.own_grid) / distinct(grid);
@@ -252,7 +255,7 @@ impl Measurement {
     /// A model fitted to the measurement.
     fn fitted(
         &self,
-        family: Family,
+        family: StandardFamily,
         settings: &FitSettings,
         progress: &Progress<'_>,
     ) -> Result<(Rival, FitResult), Error> {

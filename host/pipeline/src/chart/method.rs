@@ -4,10 +4,10 @@ use crate::Error;
 use crate::chart::cpu::cpu_seconds;
 use crate::fill::fill_bins;
 use crate::progress::silent;
-use gonia_brdf::cellwise::{
-    CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
+use gonia_brdf::baselines::{
+    BaselineFiller, BaselineSettings, Rule, UnknownBaseline, Workspace, n_interpolated,
 };
-use gonia_brdf::interpolate::{Preset, Settings};
+use gonia_brdf::interpolate::{FillSettings, Preset};
 use gonia_brdf::{Bins, Grid};
 use rayon::prelude::*;
 use std::fmt;
@@ -17,9 +17,9 @@ use std::str::FromStr;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// One cell at a time.
-    Cellwise(CellSettings),
+    Cellwise(BaselineSettings),
     /// Block by block, with these settings to begin with; the material's own are chosen.
-    Blocks(Settings),
+    Blocks(FillSettings),
 }
 
 /// What kind of method it is: the colours of the chart.
@@ -134,12 +134,12 @@ pub fn standard(grid: Grid) -> Vec<Method> {
 impl Method {
     /// What `gonia fill` does on a grid by itself.
     pub fn default_of(grid: Grid) -> Self {
-        Self::blocks(Settings::DEFAULT, grid)
+        Self::blocks(FillSettings::DEFAULT, grid)
     }
 
     /// Blocks, of two steps of the grid at least.
-    fn blocks(settings: Settings, grid: Grid) -> Self {
-        Method::Blocks(Settings {
+    fn blocks(settings: FillSettings, grid: Grid) -> Self {
+        Method::Blocks(FillSettings {
             block_deg: settings.block_deg.max(2.0 * grid.step_deg()),
             ..settings
         })
@@ -147,7 +147,7 @@ impl Method {
 
     /// The paper's method.
     pub fn paper() -> Self {
-        Method::Cellwise(CellSettings::PAPER)
+        Method::Cellwise(BaselineSettings::PAPER)
     }
 
     /// Whether it is [`Method::default_of`].
@@ -177,9 +177,13 @@ impl Method {
     }
 }
 
-fn run_cellwise(bins: &Bins, settings: &CellSettings, cells: &[(u32, u32)]) -> Result<Run, Error> {
+fn run_cellwise(
+    bins: &Bins,
+    settings: &BaselineSettings,
+    cells: &[(u32, u32)],
+) -> Result<Run, Error> {
     let start = cpu_seconds();
-    let filler = CellFiller::new(bins, settings)?;
+    let filler = BaselineFiller::new(bins, settings)?;
     let built = cpu_seconds();
     let values = cells
         .par_iter()
@@ -201,7 +205,7 @@ fn run_cellwise(bins: &Bins, settings: &CellSettings, cells: &[(u32, u32)]) -> R
     })
 }
 
-fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, Error> {
+fn run_blocks(bins: &Bins, base: &FillSettings, cells: &[(u32, u32)]) -> Result<Run, Error> {
     let start = cpu_seconds();
     let dense = fill_bins(bins, *base, false, &silent)?.dense;
     let core_s = cpu_seconds() - start;
@@ -219,9 +223,9 @@ impl fmt::Display for Method {
         match self {
             Method::Cellwise(settings) => settings.fmt(f),
             Method::Blocks(settings) => {
-                let Settings {
+                let FillSettings {
                     block_deg,
-                    nodes,
+                    neighbours: nodes,
                     tolerance,
                     budget,
                     one_bin_in,
@@ -241,10 +245,10 @@ impl fmt::Display for Method {
 }
 
 impl FromStr for Method {
-    type Err = SettingsError;
+    type Err = UnknownBaseline;
 
     /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
-    fn from_str(text: &str) -> Result<Self, SettingsError> {
+    fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
             let (nodes, rest) = rest.split_once(",tolerance=")?;
@@ -255,13 +259,13 @@ impl FromStr for Method {
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
             let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
             let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
-            Some(Method::Blocks(Settings {
+            Some(Method::Blocks(FillSettings {
                 block_deg,
-                nodes,
+                neighbours: nodes,
                 tolerance,
                 budget,
                 one_bin_in,
-                ..Settings::DEFAULT
+                ..FillSettings::DEFAULT
             }))
         };
         blocks().map_or_else(|| text.parse().map(Method::Cellwise), Ok)

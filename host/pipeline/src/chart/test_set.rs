@@ -353,7 +353,7 @@ fn factor_to(truth: &DenseFile, bins: &Bins) -> f64 {
         })
         .filter(|ratio| ratio.is_finite())
         .collect();
-    f64::from(gonia_brdf::bins::median(&mut ratios)).exp()
+    f64::from(gonia_brdf::quantile::median(&mut ratios)).exp()
 }
 
 fn draw(brdf: &dyn Brdf) -> Picture {

@@ -1,6 +1,7 @@
-//! Random numbers that are the same on every machine.
+//! Random numbers that are the same on every machine: for starts of fits, and for tests.
 
 /// Steele, Lea and Flood's SplitMix64.
+#[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
@@ -22,5 +23,10 @@ impl Random {
     /// Evenly in low .. high.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.share()
+    }
+
+    /// A nearly normal number of mean 0 and variance 1: the sum of twelve even ones, less its mean.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.share()).sum::<f64>() - 6.0
     }
 }

@@ -3,7 +3,7 @@
 //! A name is the rule, then what differs from the rule's usual settings, between commas:
 //! `rbf-linear,k=100,half=0.5,log,means,mirrored`.
 
-use super::kernel::Kernel;
+use super::basis::BasisFunction;
 use super::moving_least_squares::MovingLeastSquares;
 use super::nearest::Nearest;
 use super::rbf::Rbf;
@@ -31,7 +31,7 @@ pub enum Rule {
     /// Radial basis functions.
     Rbf {
         /// The function.
-        kernel: Kernel,
+        kernel: BasisFunction,
         /// Its length in radii of the neighbourhood; 1 for kernels that have none.
         length: f64,
     },
@@ -57,7 +57,7 @@ pub enum Values {
 
 /// How to interpolate one cell at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CellSettings {
+pub struct BaselineSettings {
     /// How a value is made of the neighbours.
     pub rule: Rule,
     /// How many neighbours.
@@ -68,7 +68,7 @@ pub struct CellSettings {
     pub values: Values,
     /// Where a bin's value belongs.
     pub places: Places,
-    /// Whether every bin is known at its reciprocal place too. Without it values are made
+    /// Whether every bin stands at its reciprocal place too. Without it values are made
     /// reciprocal at the end, as the mean of both.
     pub mirrored: bool,
     /// What makes the system of equations solvable, and smooths; see [`Rule`]'s methods.
@@ -82,18 +82,18 @@ pub struct CellSettings {
      thin-plate, cubic, gaussian, multiquadric, wendland, matern), then what differs, as in \
      rbf-cubic,k=50,half=0.5,log,means,mirrored,nugget=1e-4"
 )]
-pub struct SettingsError(String);
+pub struct UnknownBaseline(String);
 
 /// Most neighbours: the time grows with their cube.
 const MOST_NEIGHBOURS: usize = 2000;
 
-impl CellSettings {
+impl BaselineSettings {
     /// The paper's method: the 200 nearest bins in chords between nodes, linear radial basis
     /// functions of the values, the mean of reciprocal values at the end; and the least that makes
     /// its systems solvable, a nugget.
-    pub const PAPER: CellSettings = CellSettings {
+    pub const PAPER: BaselineSettings = BaselineSettings {
         rule: Rule::Rbf {
-            kernel: Kernel::Linear,
+            kernel: BasisFunction::Linear,
             length: 1.0,
         },
         neighbours: 200,
@@ -114,7 +114,7 @@ impl CellSettings {
             "mls2" => (Rule::MovingLeastSquares { degree: 2 }, 100),
             _ => {
                 let name = name.strip_prefix("rbf-")?;
-                let kernel = Kernel::ALL.into_iter().find(|k| k.name() == name)?;
+                let kernel = BasisFunction::ALL.into_iter().find(|k| k.name() == name)?;
                 let length = kernel.usual_length().unwrap_or(1.0);
                 (Rule::Rbf { kernel, length }, 200)
             }
@@ -196,11 +196,11 @@ impl CellSettings {
     }
 }
 
-impl FromStr for CellSettings {
-    type Err = SettingsError;
+impl FromStr for BaselineSettings {
+    type Err = UnknownBaseline;
 
-    fn from_str(text: &str) -> Result<Self, SettingsError> {
-        let error = || SettingsError(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
+        let error = || UnknownBaseline(text.to_owned());
         let mut words = text.split(',').map(str::trim);
         let mut settings = words.next().and_then(Self::usual).ok_or_else(error)?;
         for word in words {
@@ -210,7 +210,7 @@ impl FromStr for CellSettings {
     }
 }
 
-impl fmt::Display for CellSettings {
+impl fmt::Display for BaselineSettings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if *self == Self::PAPER {
             return f.write_str("paper");
@@ -269,11 +269,11 @@ mod tests {
             "rbf-wendland,half=0.5,log,means,mirrored",
             "rbf-matern,k=400",
         ] {
-            let settings: CellSettings = name.parse().unwrap();
+            let settings: BaselineSettings = name.parse().unwrap();
             assert_eq!(settings.to_string(), name);
         }
-        let paper: CellSettings = "rbf-linear, k=200, chords".parse().unwrap();
-        assert_eq!(paper, CellSettings::PAPER);
+        let paper: BaselineSettings = "rbf-linear, k=200, chords".parse().unwrap();
+        assert_eq!(paper, BaselineSettings::PAPER);
     }
 
     #[test]
@@ -291,7 +291,7 @@ mod tests {
             "nearest,power=2",
             "paper,",
         ] {
-            let error = bad.parse::<CellSettings>().unwrap_err().to_string();
+            let error = bad.parse::<BaselineSettings>().unwrap_err().to_string();
             assert!(
                 error.contains(&format!("'{bad}'")) && error.contains("thin-plate"),
                 "{error}"

@@ -1,14 +1,14 @@
 //! The bins nearest to a place, exactly.
 
-use super::settings::{CellSettings, Places, Values};
+use super::settings::{BaselineSettings, Places, Values};
 use super::space::{Place, Space};
 use crate::bins::Bins;
 use crate::direction::Vec3;
-use crate::interpolate::nodes::floor_of;
+use crate::interpolate::datum::floor_of;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use std::num::NonZero;
 
-/// Known values around a place, nearest first.
+/// Site values around a place, nearest first.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbourhood {
     /// Where they are, counted from the place.
@@ -45,14 +45,14 @@ fn length2(offset: &Place) -> f64 {
 
 /// A bin, at its own place or at its mirror's, once or some turns around.
 #[derive(Clone, Copy)]
-struct Known {
+struct Site {
     bin: u32,
     is_mirror: bool,
     turns: [i8; 2],
 }
 
-/// All that is known, and a tree over its places.
-pub(super) struct Neighbours<'a> {
+/// All sites, and a tree over their places.
+pub(super) struct BinTree<'a> {
     bins: &'a Bins,
     space: Space,
     places: Places,
@@ -61,15 +61,15 @@ pub(super) struct Neighbours<'a> {
     floor: [f32; 3],
     /// Unit vector of each direction of the grid.
     directions: Vec<Vec3>,
-    known: Vec<Known>,
+    sites: Vec<Site>,
     /// Single precision ranks; distances are taken again in double precision.
     tree: Option<ImmutableKdTree<f32, 6>>,
 }
 
-impl<'a> Neighbours<'a> {
-    pub fn new(bins: &'a Bins, settings: &CellSettings) -> Self {
+impl<'a> BinTree<'a> {
+    pub fn new(bins: &'a Bins, settings: &BaselineSettings) -> Self {
         let grid = bins.grid();
-        let mut neighbours = Self {
+        let mut tree = Self {
             bins,
             space: settings.space,
             places: settings.places,
@@ -78,38 +78,38 @@ impl<'a> Neighbours<'a> {
             directions: (0..grid.n_directions())
                 .map(|d| grid.direction(d).to_vec3())
                 .collect(),
-            known: Vec::new(),
+            sites: Vec::new(),
             tree: None,
         };
-        let mut known = Vec::new();
+        let mut sites = Vec::new();
         let mut points = Vec::new();
         for bin in 0..bins.bins().len() as u32 {
             for is_mirror in [false, true] {
-                let once = Known {
+                let once = Site {
                     bin,
                     is_mirror,
                     turns: [0, 0],
                 };
-                let place = neighbours.place_of(once);
+                let place = tree.place_of(once);
                 if is_mirror
                     && (!settings.mirrored
                         || place
-                            == neighbours.place_of(Known {
+                            == tree.place_of(Site {
                                 is_mirror: false,
                                 ..once
                             }))
                 {
                     continue;
                 }
-                for turns in neighbours.space.turns(&place) {
-                    points.push(neighbours.space.turned(place, turns).map(|x| x as f32));
-                    known.push(Known { turns, ..once });
+                for turns in tree.space.turns(&place) {
+                    points.push(tree.space.turned(place, turns).map(|x| x as f32));
+                    sites.push(Site { turns, ..once });
                 }
             }
         }
-        neighbours.known = known;
-        neighbours.tree = ImmutableKdTree::new_from_slice(&points).ok();
-        neighbours
+        tree.sites = sites;
+        tree.tree = ImmutableKdTree::new_from_slice(&points).ok();
+        tree
     }
 
     /// Smallest value per channel that counts as positive.
@@ -121,7 +121,7 @@ impl<'a> Neighbours<'a> {
     /// equally far the earlier bin comes first.
     pub fn gather(&self, light: Vec3, view: Vec3, n: usize, near: &mut Neighbourhood) {
         near.clear();
-        let (Some(tree), Some(n)) = (&self.tree, NonZero::new(n.min(self.known.len()))) else {
+        let (Some(tree), Some(n)) = (&self.tree, NonZero::new(n.min(self.sites.len()))) else {
             return;
         };
         let here = self.space.place(light, view);
@@ -131,20 +131,20 @@ impl<'a> Neighbours<'a> {
             .execute()
             .into_iter()
             .map(|hit| {
-                let known = self.known[hit.item as usize];
-                let place = self.space.turned(self.place_of(known), known.turns);
+                let site = self.sites[hit.item as usize];
+                let place = self.space.turned(self.place_of(site), site.turns);
                 let offset = std::array::from_fn(|k| place[k] - here[k]);
                 (length2(&offset), hit.item, offset)
             })
             .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, item, offset) in found {
-            near.push(offset, self.value_of(self.known[item as usize]));
+            near.push(offset, self.value_of(self.sites[item as usize]));
         }
     }
 
-    fn place_of(&self, known: Known) -> Place {
-        let bin = &self.bins.bins()[known.bin as usize];
+    fn place_of(&self, site: Site) -> Place {
+        let bin = &self.bins.bins()[site.bin as usize];
         let (light, view) = match self.places {
             Places::Centres => {
                 let (light, view) = self.bins.grid().light_and_view(bin.cell as usize);
@@ -152,15 +152,15 @@ impl<'a> Neighbours<'a> {
             }
             Places::Means => (bin.light.map(f64::from), bin.view.map(f64::from)),
         };
-        if known.is_mirror {
+        if site.is_mirror {
             self.space.place(view, light)
         } else {
             self.space.place(light, view)
         }
     }
 
-    fn value_of(&self, known: Known) -> [f64; 3] {
-        let bin = &self.bins.bins()[known.bin as usize];
+    fn value_of(&self, site: Site) -> [f64; 3] {
+        let bin = &self.bins.bins()[site.bin as usize];
         match self.values {
             Values::Linear => bin.median.map(f64::from),
             Values::Logarithm => {

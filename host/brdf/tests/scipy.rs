@@ -1,11 +1,11 @@
-//! Against scipy's `RBFInterpolator`: the numbers are printed by `bench/peers/scipy_reference.py`,
+//! The baselines against scipy's `RBFInterpolator`: the numbers are printed by `bench/peers/scipy_reference.py`,
 //! which makes the same bins.
 
-use super::{CellSettings, Kernel, Predictor, Rule, Workspace};
-use crate::bins::Bins;
-use crate::direction::{Direction, Vec3, dot};
-use crate::grid::Grid;
-use crate::sample::Sample;
+#![allow(clippy::unwrap_used)]
+
+use gonia_brdf::baselines::{BaselineSettings, BasisFunction, Predictor, Rule, Workspace};
+use gonia_brdf::direction::{Vec3, dot};
+use gonia_brdf::{Bins, Direction, Grid, Sample};
 
 const QUERIES: [[f64; 4]; 4] = [
     [33.3, 47.1, 21.7, 160.9],
@@ -79,23 +79,23 @@ fn value(i: Vec3, v: Vec3) -> [f64; 3] {
 #[test]
 fn radial_basis_functions_give_what_scipy_gives() {
     let bins = bins();
-    let rbf = |kernel: Kernel, nugget, neighbours| CellSettings {
+    let rbf = |kernel: BasisFunction, nugget, neighbours| BaselineSettings {
         rule: Rule::Rbf {
             kernel,
             length: kernel.usual_length().unwrap_or(1.0),
         },
         neighbours,
         nugget,
-        ..CellSettings::PAPER
+        ..BaselineSettings::PAPER
     };
     let cases = [
-        (CellSettings::PAPER, 1e-9),
+        (BaselineSettings::PAPER, 1e-9),
         // Without a nugget, or with a tail along six nearly dependent axes, more digits are lost.
-        (rbf(Kernel::Linear, 0.0, 50), 1e-9),
-        (rbf(Kernel::ThinPlate, 1e-3, 200), 1e-9),
-        (rbf(Kernel::Cubic, 1e-2, 100), 1e-9),
-        (rbf(Kernel::Gaussian, 1e-3, 60), 1e-9),
-        (rbf(Kernel::Multiquadric, 1e-3, 60), 1e-9),
+        (rbf(BasisFunction::Linear, 0.0, 50), 1e-9),
+        (rbf(BasisFunction::ThinPlate, 1e-3, 200), 1e-9),
+        (rbf(BasisFunction::Cubic, 1e-2, 100), 1e-9),
+        (rbf(BasisFunction::Gaussian, 1e-3, 60), 1e-9),
+        (rbf(BasisFunction::Multiquadric, 1e-3, 60), 1e-9),
     ];
     let mut work = Workspace::default();
     for ((settings, tolerance), expected) in cases.iter().zip(SCIPY.chunks(QUERIES.len())) {

@@ -5,13 +5,13 @@
 //! makes solvable what is not: the paper's own systems are singular wherever nodes coincide. The
 //! same system, with the same meaning of λ, as that of scipy's `RBFInterpolator`.
 
-use super::kernel::Kernel;
+use super::basis::BasisFunction;
 use super::{Failure, Interpolant, Neighbourhood, System};
 
 /// An interpolant by radial basis functions.
 pub struct Rbf {
     /// The basis function.
-    pub kernel: Kernel,
+    pub kernel: BasisFunction,
     /// Its length in radii of the neighbourhood; of no consequence to kernels that have none.
     pub length: f64,
     /// λ, added to the diagonal.
@@ -111,7 +111,7 @@ mod tests {
         for (n, nugget) in [(8, 0.0), (60, 1e-3), (200, 1e-3), (200, 0.1)] {
             let near = scattered(n);
             let rbf = Rbf {
-                kernel: Kernel::Linear,
+                kernel: BasisFunction::Linear,
                 length: 1.0,
                 nugget,
             };
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn without_a_nugget_nodes_keep_their_values_and_with_one_they_need_not() {
         let mut system = System::default();
-        for kernel in Kernel::ALL {
+        for kernel in BasisFunction::ALL {
             let mut near = scattered(40);
             let at = near.offsets[7];
             let value = near.values[7];
@@ -156,7 +156,7 @@ mod tests {
         near.push(near.offsets[4], near.values[4]);
         let mut system = System::measuring_condition();
         let mut rbf = Rbf {
-            kernel: Kernel::Linear,
+            kernel: BasisFunction::Linear,
             length: 1.0,
             nugget: 0.0,
         };
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn a_tail_needs_as_many_neighbours_as_it_has_terms() {
         let rbf = Rbf {
-            kernel: Kernel::Cubic,
+            kernel: BasisFunction::Cubic,
             length: 1.0,
             nugget: 1e-3,
         };

@@ -1,26 +1,27 @@
-//! What is known, as nodes to interpolate between: log values at mean measured directions, each
-//! with its reciprocal twin.
+//! The data to interpolate between: logarithms of values at mean measured directions, each with its
+//! reciprocal twin.
 
 use super::coordinates::{Coordinates, Point};
-use crate::bins::{Bin, Bins, median};
+use crate::bins::{Bin, Bins};
+use crate::quantile::median;
 use rayon::prelude::*;
 
-/// One known value.
+/// One value and its place.
 #[derive(Clone, Copy, Debug)]
-pub struct Node {
+pub struct Datum {
     /// Place.
     pub point: Point,
     /// Natural logarithm of the bin's value, per channel: see [`Bins::log_value`].
     pub log_value: [f32; 3],
-    /// Number of samples behind it; less where the value is doubted.
+    /// Number of samples behind it; less for an outlier.
     pub count: f32,
     /// Twice the number of the bin it came from, and one more where light and view are exchanged;
-    /// of no meaning for a merged node.
+    /// of no meaning for a merged datum.
     pub source: u32,
 }
 
-impl Node {
-    /// Number of the bin that the node came from.
+impl Datum {
+    /// Number of the bin that the datum came from.
     pub fn bin(&self) -> usize {
         (self.source / 2) as usize
     }
@@ -40,45 +41,46 @@ impl Node {
 /// make dark values negative, and their logarithm must stay finite.
 const FLOOR_SHARE: f32 = 1e-4;
 
-/// A node of one bin in so many, numbered as all bins come: the bin's own or its mirror image (light and view exchanged),
-/// whichever's difference of light and view points to positive x. The others are the mirror images of these.
-pub fn half_of_nodes(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec<Node> {
+/// The datum of one bin in so many, numbered as all bins come: the bin's own or its mirror image (light and
+/// view exchanged), whichever has the difference of light and view that points to positive x. The others
+/// are the mirror images of these.
+pub fn half_of_data(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec<Datum> {
     let floor = floor_of(bins.bins().iter());
     (0..bins.bins().len())
         .into_par_iter()
         .step_by(one_in.max(1))
         .map(|number| {
             let bin = &bins.bins()[number];
-            let node = Node {
+            let datum = Datum {
                 point: coordinates.point(bin.light.map(f64::from), bin.view.map(f64::from)),
                 log_value: [0, 1, 2].map(|c| bins.log_value(bin, c, floor[c])),
                 count: bin.count as f32,
                 source: 2 * number as u32,
             };
-            if node.point[3] < 0.0 {
-                node.mirrored()
+            if datum.point[3] < 0.0 {
+                datum.mirrored()
             } else {
-                node
+                datum
             }
         })
         .collect()
 }
 
-/// The mean of nodes at given places, weighted by count; `None` of none.
-pub(super) fn merge<'a>(nodes: impl Iterator<Item = (Point, &'a Node)>) -> Option<Node> {
+/// The mean of data at given places, weighted by count; `None` of none.
+pub(super) fn merge<'a>(data: impl Iterator<Item = (Point, &'a Datum)>) -> Option<Datum> {
     let mut point = [0.0; 6];
     let mut log_value = [0.0; 3];
     let mut count = 0.0;
-    for (place, node) in nodes {
+    for (place, datum) in data {
         for k in 0..6 {
-            point[k] += node.count * place[k];
+            point[k] += datum.count * place[k];
         }
         for c in 0..3 {
-            log_value[c] += node.count * node.log_value[c];
+            log_value[c] += datum.count * datum.log_value[c];
         }
-        count += node.count;
+        count += datum.count;
     }
-    (count > 0.0).then(|| Node {
+    (count > 0.0).then(|| Datum {
         point: point.map(|p| p / count),
         log_value: log_value.map(|v| v / count),
         count,
@@ -89,7 +91,7 @@ pub(super) fn merge<'a>(nodes: impl Iterator<Item = (Point, &'a Node)>) -> Optio
 /// The smallest value per channel that takes part.
 pub(crate) fn floor_of<'a>(bins: impl Iterator<Item = &'a Bin> + Clone) -> [f32; 3] {
     [0, 1, 2].map(|c| {
-        // A few thousand bins tell the median brightness well enough for a floor.
+        // The median brightness of a few thousand bins is good enough for a floor.
         let total = bins.clone().count().max(1);
         let mut values: Vec<f32> = bins
             .clone()

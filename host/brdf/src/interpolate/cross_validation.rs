@@ -1,11 +1,11 @@
-//! Bins held out, and how well the others predict them.
+//! Cross-validation grouped by image: how well the bins of some frames predict those of the others.
 //!
-//! Holding out single bins tells nothing, because a bin's neighbours come from the same frame; what
+//! Leaving out single bins would show nothing, because a bin's neighbours come from the same frame; what
 //! is missing between the measured directions is whole frames. Samples that come without the
-//! number of a frame are held out by clusters of directions instead.
+//! number of a frame are grouped by clusters of directions instead.
 
-use super::Settings;
-use super::known::{Known, MANY_BINS};
+use super::FillSettings;
+use super::data::{Data, MANY_BINS};
 use super::patches::{Patch, cover};
 use super::refine::Refiner;
 use crate::bins::{Bin, Bins};
@@ -14,49 +14,48 @@ use crate::grid::Grid;
 use crate::sample::Sample;
 use rayon::prelude::*;
 
-/// Fewer tests than this say nothing.
+/// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
-/// Held-out bins of a frame in one block that are averaged, at most.
+/// Bins of a frame in one block whose predictions are averaged, at most.
 const MATES: usize = 64;
-/// Sets of frames to hold out in turn, where there are few bins: one would decide by chance, and several
-/// are cheap then.
-const SETS: u32 = 4;
+/// Folds where there are few bins: one would decide by chance, and several are cheap then.
+const FOLDS: u32 = 4;
 
-/// Some bins held out of all.
-pub struct HoldOut<'a> {
+/// All bins, divided into those that predict and those that are predicted.
+pub struct Fold<'a> {
     bins: &'a Bins,
-    /// Of each bin, whether it is known.
+    /// Of each bin, whether it takes part in the prediction.
     training: Vec<bool>,
-    /// All that are held out.
+    /// All that are left out.
     left_out: Vec<&'a Bin>,
-    /// Whether frames are held out, not clusters.
+    /// Whether frames are the groups, not clusters.
     framed: bool,
-    /// Bins that are to be predicted, each with the number of held-out bins it stands for.
+    /// Bins that are to be predicted, each with the number of left-out bins it stands for.
     tests: Vec<(&'a Bin, f32)>,
 }
 
-/// A held-out bin and what the others make of it.
+/// A bin that was left out, and what the others predict of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Prediction<'a> {
     /// The bin.
     pub bin: &'a Bin,
-    /// How many held-out bins it stands for.
+    /// How many left-out bins it stands for.
     pub weight: f32,
     /// Natural logarithm of the value predicted, per channel.
     pub log: [f32; 3],
     /// Logarithm of predicted over measured, of channels that can have one.
     pub residual: [Option<f32>; 3],
-    /// Variance of the prediction as the nodes around show it, per channel, not calibrated.
+    /// Variance of the prediction as the data around show it, per channel, not calibrated.
     pub variance: [f32; 3],
 }
 
-/// What the others make of the held-out bins of one frame (or cluster) in one block. Their mean tells of
-/// errors that noise hides from each of them.
+/// What the others predict of the left-out bins of one frame (or cluster) in one block. Their mean shows
+/// errors that noise hides in each of them.
 #[derive(Clone, Debug)]
-pub struct Mean<'a> {
+pub struct MeanPrediction<'a> {
     /// One of them.
     pub first: Prediction<'a>,
     /// All of them.
@@ -67,30 +66,30 @@ pub struct Mean<'a> {
     pub variance: [f32; 3],
 }
 
-impl<'a> HoldOut<'a> {
-    /// Holds out one group of frames (or clusters) in `one_in`, the `set`th choice of several, and of
-    /// their bins about `tests`: half of them among the brightest tenth, because an error that a few
+impl<'a> Fold<'a> {
+    /// Leaves out one frame (or cluster) in `one_in`, those of fold `number`, and tests about `tests` of
+    /// their bins: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
-    pub fn new(all: &'a Bins, set: u32, one_in: u32, tests: usize) -> Option<Self> {
+    pub fn new(all: &'a Bins, number: u32, one_in: u32, tests: usize) -> Option<Self> {
         let bins = all.bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
-        let held_out = |bin: &Bin| {
+        let is_left_out = |bin: &Bin| {
             hash(group_of(bin, framed))
-                .wrapping_add(set)
+                .wrapping_add(number)
                 .is_multiple_of(one_in)
         };
-        // Bins of several frames may hold a part of a held-out frame, so none of them takes part.
+        // Bins of several frames may hold a part of a left-out frame, so none of them takes part.
         let takes_part = |bin: &Bin| !framed || bin.frame != Sample::NO_FRAME;
         let training: Vec<bool> = bins
             .iter()
-            .map(|bin| takes_part(bin) && !held_out(bin))
+            .map(|bin| takes_part(bin) && !is_left_out(bin))
             .collect();
         let left_out: Vec<&Bin> = bins
             .iter()
-            .filter(|bin| takes_part(bin) && held_out(bin))
+            .filter(|bin| takes_part(bin) && is_left_out(bin))
             .collect();
         let tests = pick(left_out.clone(), tests);
-        let trained = training.iter().filter(|known| **known).count();
+        let trained = training.iter().filter(|is_used| **is_used).count();
         (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
             bins: all,
             training,
@@ -100,24 +99,24 @@ impl<'a> HoldOut<'a> {
         })
     }
 
-    /// How many sets to hold out in turn.
-    pub fn sets(bins: &Bins) -> u32 {
+    /// How many folds to take.
+    pub fn usual_number(bins: &Bins) -> u32 {
         if bins.bins().len() < MANY_BINS {
-            SETS
+            FOLDS
         } else {
             1
         }
     }
 
-    /// Predicts the tests, by the very blocks that a fill of these known bins (the same that some were held
-    /// out of) with these settings would use.
-    pub fn predict(&self, known: &Known, settings: &Settings) -> Vec<Prediction<'a>> {
-        let means = self.predict_among(known, settings, |_| &[]);
+    /// Predicts the tests, by the very blocks that a fill of these data (of the same bins) with these
+    /// settings would use.
+    pub fn predict(&self, data: &Data, settings: &FillSettings) -> Vec<Prediction<'a>> {
+        let means = self.predict_among(data, settings, |_| &[]);
         means.into_iter().map(|mean| mean.first).collect()
     }
 
-    /// Predicts the tests together with the other held-out bins of their frames (or clusters) in the same block.
-    pub fn predict_means(&self, known: &Known, settings: &Settings) -> Vec<Mean<'a>> {
+    /// Predicts the tests together with the other left-out bins of their frames (or clusters) in the same block.
+    pub fn predict_means(&self, data: &Data, settings: &FillSettings) -> Vec<MeanPrediction<'a>> {
         let grid = self.bins.grid();
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);
@@ -128,7 +127,7 @@ impl<'a> HoldOut<'a> {
         let mut sorted: Vec<_> = self.left_out.iter().map(|bin| (key(bin), *bin)).collect();
         sorted.sort_by_key(|(key, bin)| (*key, bin.cell));
         let (keys, bins): (Vec<_>, Vec<&Bin>) = sorted.into_iter().unzip();
-        self.predict_among(known, settings, |bin| {
+        self.predict_among(data, settings, |bin| {
             let key = key(bin);
             let from = keys.partition_point(|k| *k < key);
             let to = keys.partition_point(|k| *k <= key);
@@ -138,10 +137,10 @@ impl<'a> HoldOut<'a> {
 
     fn predict_among<'b>(
         &self,
-        known: &Known,
-        settings: &Settings,
+        data: &Data,
+        settings: &FillSettings,
         mates: impl Fn(&Bin) -> &'b [&'a Bin] + Sync,
-    ) -> Vec<Mean<'a>>
+    ) -> Vec<MeanPrediction<'a>>
     where
         'a: 'b,
     {
@@ -153,14 +152,14 @@ impl<'a> HoldOut<'a> {
                 (bin.median[c] > 0.0).then(|| log[c] - measured)
             })
         };
-        let sorted = known.sorted_for(settings.coordinates);
-        let nodes = sorted
+        let sorted = data.sorted_for(settings.coordinates);
+        let training = sorted
             .as_ref()
-            .unwrap_or(known)
-            .part(settings.coordinates, |bin| self.training[bin]);
+            .unwrap_or(data)
+            .subset(settings.coordinates, |bin| self.training[bin]);
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);
-        let work = || (Refiner::default(), Vec::new());
+        let work = || (Refiner::new(settings), Vec::new());
         self.tests
             .par_iter()
             .map_init(work, |(refiner, members), (bin, weight)| {
@@ -172,8 +171,8 @@ impl<'a> HoldOut<'a> {
                 let others = others.filter(|mate| mate.cell != bin.cell).copied();
                 members.clear();
                 members.extend(std::iter::once(*bin).chain(others).map(Member::of));
-                let predicted = refiner.predict(&nodes, settings, (p, q), members);
-                let mut mean = Mean {
+                let predicted = refiner.predict(&training, settings, (p, q), members);
+                let mut mean = MeanPrediction {
                     first: Prediction {
                         bin,
                         weight: *weight,
@@ -217,7 +216,7 @@ impl AsRef<(Vec3, Vec3)> for Member<'_> {
     }
 }
 
-/// Number of the frame or the cluster that a bin is held out with.
+/// Number of the frame or the cluster that a bin belongs to.
 fn group_of(bin: &Bin, framed: bool) -> u32 {
     if framed { bin.frame } else { cluster(bin) }
 }
@@ -265,7 +264,7 @@ fn cluster(bin: &Bin) -> u32 {
     (part(bin.light) << 16) ^ part(bin.view)
 }
 
-/// Spreads frame numbers, so that held-out frames are no regular pattern of the plan.
+/// Spreads frame numbers, so that the frames of a fold are no regular pattern of the plan.
 fn hash(group: u32) -> u32 {
     let mut x = u64::from(group).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x ^= x >> 29;

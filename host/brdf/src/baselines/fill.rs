@@ -1,18 +1,18 @@
 //! All cells of the grid, one by one.
 
 use super::predict::{Predictor, Workspace};
-use super::settings::CellSettings;
+use super::settings::BaselineSettings;
 use crate::bins::Bins;
 use crate::dense::DenseBrdf;
 use crate::grid::Grid;
 use crate::interpolate::FillError;
-use crate::interpolate::fill::spread_poles;
+use crate::interpolate::planes::spread_poles;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
 /// A filled grid, and how it went.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CellFill {
+pub struct BaselineFill {
     /// The values: positive, finite, exactly reciprocal, one a pole.
     pub dense: DenseBrdf,
     /// Values that the method failed at, and that are their nearest bin's.
@@ -23,17 +23,18 @@ pub struct CellFill {
 }
 
 /// Interpolates every cell that has no bin; bins keep their medians; then reciprocal values are
-/// averaged. Bins that are known on both sides (`mirrored`) are reciprocal before, so that only one
-/// side is interpolated. `progress` is told the share done, 0 ..= 1, from any thread.
+/// averaged. Bins that stand at their reciprocal place too (`mirrored`) are reciprocal before, so that only one
+/// side is interpolated. `progress` is called with the share done, 0 ..= 1, from any
+/// thread.
 ///
 /// # Errors
 /// Too few bins.
 pub fn fill(
     bins: &Bins,
-    settings: &CellSettings,
+    settings: &BaselineSettings,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<CellFill, FillError> {
-    let filler = CellFiller::new(bins, settings)?;
+) -> Result<BaselineFill, FillError> {
+    let filler = BaselineFiller::new(bins, settings)?;
     let grid = bins.grid();
     let n = grid.n_directions();
     let mut planes = [(); 3].map(|()| vec![0f32; grid.n_cells()]);
@@ -59,7 +60,7 @@ pub fn fill(
         spread_poles(grid, plane);
     }
     let tally = filler.tally();
-    Ok(CellFill {
+    Ok(BaselineFill {
         dense: DenseBrdf::from_planes(grid, planes),
         failed: tally.failed,
         raised: tally.raised,
@@ -75,12 +76,12 @@ pub fn n_interpolated(bins: &Bins, mirrored: bool) -> usize {
         return n * n - bins.bins().len();
     }
     let filled = |cell: usize| bin_at(bins, cell).is_some();
-    let known = bins.bins().iter().filter(|bin| {
+    let measured = bins.bins().iter().filter(|bin| {
         let (light, view) = grid.light_and_view(bin.cell as usize);
         // Of two bins that are each other's mirror the second one counts.
         light >= view || !filled(grid.cell(view, light))
     });
-    n * (n + 1) / 2 - known.count()
+    n * (n + 1) / 2 - measured.count()
 }
 
 /// Whether a direction is the pole at another azimuth than 0.
@@ -97,7 +98,7 @@ fn bin_at(bins: &Bins, cell: usize) -> Option<[f32; 3]> {
 }
 
 /// Gives single cells the values that [`fill()`] gives them.
-pub struct CellFiller<'a> {
+pub struct BaselineFiller<'a> {
     predictor: Predictor<'a>,
     bins: &'a Bins,
     interpolated: AtomicU64,
@@ -105,7 +106,7 @@ pub struct CellFiller<'a> {
     raised: AtomicU64,
 }
 
-/// What a [`CellFiller`] has done so far.
+/// What a [`BaselineFiller`] has done so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tally {
     /// Interpolations; a cell without a bin and its mirror take two, or one if `mirrored`.
@@ -116,12 +117,12 @@ pub struct Tally {
     pub raised: u64,
 }
 
-impl<'a> CellFiller<'a> {
+impl<'a> BaselineFiller<'a> {
     /// Makes the bins ready.
     ///
     /// # Errors
     /// Too few bins.
-    pub fn new(bins: &'a Bins, settings: &CellSettings) -> Result<Self, FillError> {
+    pub fn new(bins: &'a Bins, settings: &BaselineSettings) -> Result<Self, FillError> {
         Ok(Self {
             predictor: Predictor::new(bins, settings)?,
             bins,
@@ -140,8 +141,8 @@ impl<'a> CellFiller<'a> {
         }
     }
 
-    /// The value of a pair of direction indices, in either order. Of a pole only azimuth 0 is known
-    /// by its bin.
+    /// The value of a pair of direction indices, in either order. Of a pole only azimuth 0 has
+    /// a bin.
     pub fn pair(&self, light: usize, view: usize, work: &mut Workspace) -> [f32; 3] {
         let grid = self.bins.grid();
         let one = bin_at(self.bins, grid.cell(light, view));
@@ -151,7 +152,7 @@ impl<'a> CellFiller<'a> {
         } else if self.predictor.settings().mirrored {
             match (one, other) {
                 (Some(one), Some(other)) => mean(one, other),
-                (Some(known), None) | (None, Some(known)) => known,
+                (Some(value), None) | (None, Some(value)) => value,
                 (None, None) => self.interpolated(light, view, work),
             }
         } else {
@@ -248,7 +249,7 @@ mod tests {
             "mls1",
             "mls2,mirrored",
         ] {
-            let settings: CellSettings = name.parse().unwrap();
+            let settings: BaselineSettings = name.parse().unwrap();
             let filled = fill(&bins, &settings, &|share| assert!(share <= 1.0)).unwrap();
             assert_eq!((filled.failed, filled.raised), (0, 0), "{name}");
             let dense = &filled.dense;
@@ -287,7 +288,7 @@ mod tests {
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().unwrap();
-            pool.install(|| fill(&samples, &CellSettings::PAPER, &|_| ()).unwrap())
+            pool.install(|| fill(&samples, &BaselineSettings::PAPER, &|_| ()).unwrap())
         };
         assert_eq!(with(1), with(3));
     }

@@ -1,7 +1,7 @@
 //! Values at any pair of directions, one at a time.
 
-use super::neighbours::{Neighbourhood, Neighbours};
-use super::settings::{CellSettings, Values};
+use super::bin_tree::{BinTree, Neighbourhood};
+use super::settings::{BaselineSettings, Values};
 use super::system::System;
 use super::{Failure, Interpolant};
 use crate::bins::Bins;
@@ -9,10 +9,10 @@ use crate::direction::Vec3;
 use crate::interpolate::FillError;
 use crate::interpolate::fill::MIN_BINS;
 
-/// Bins, ready to be asked.
+/// Bins, and how to interpolate between them.
 pub struct Predictor<'a> {
-    settings: CellSettings,
-    neighbours: Neighbours<'a>,
+    settings: BaselineSettings,
+    tree: BinTree<'a>,
     interpolant: Box<dyn Interpolant>,
 }
 
@@ -42,25 +42,25 @@ impl<'a> Predictor<'a> {
     ///
     /// # Errors
     /// Fewer bins than [`MIN_BINS`].
-    pub fn new(bins: &'a Bins, settings: &CellSettings) -> Result<Self, FillError> {
+    pub fn new(bins: &'a Bins, settings: &BaselineSettings) -> Result<Self, FillError> {
         if bins.bins().len() < MIN_BINS {
             return Err(FillError::TooFewBins(bins.bins().len()));
         }
         Ok(Self {
             settings: *settings,
-            neighbours: Neighbours::new(bins, settings),
+            tree: BinTree::new(bins, settings),
             interpolant: settings.interpolant(),
         })
     }
 
     /// What it was made with.
-    pub fn settings(&self) -> &CellSettings {
+    pub fn settings(&self) -> &BaselineSettings {
         &self.settings
     }
 
     /// Smallest value per channel that counts as positive: a ten-thousandth of the median.
     pub fn floor(&self) -> [f32; 3] {
-        self.neighbours.floor()
+        self.tree.floor()
     }
 
     /// The value that the method gives at a pair of unit vectors: also a negative one.
@@ -69,7 +69,7 @@ impl<'a> Predictor<'a> {
     /// Where the method fails; [`Predictor::nearest`] then has what there is.
     pub fn at(&self, light: Vec3, view: Vec3, work: &mut Workspace) -> Result<[f64; 3], Failure> {
         work.system.forget();
-        self.neighbours
+        self.tree
             .gather(light, view, self.settings.neighbours, &mut work.near);
         let value = self.interpolant.estimate(&work.near, &mut work.system)?;
         let value = match self.settings.values {
@@ -87,7 +87,7 @@ impl<'a> Predictor<'a> {
 
     /// The value of the nearest bin.
     pub fn nearest(&self, light: Vec3, view: Vec3, work: &mut Workspace) -> [f64; 3] {
-        self.neighbours.gather(light, view, 1, &mut work.near);
+        self.tree.gather(light, view, 1, &mut work.near);
         let value = work.near.values.first().copied().unwrap_or_default();
         match self.settings.values {
             Values::Linear => value,

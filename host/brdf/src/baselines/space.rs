@@ -19,7 +19,8 @@ pub enum Space {
     Symmetric(Coordinates),
 }
 
-/// How far across φ = 0 neighbours are seen, radians. Nodes this near to it are known on both sides.
+/// How far across φ = 0 neighbours are seen, radians. Places this near to it are repeated on the other
+/// side.
 const SEAM: f64 = TAU / 4.0;
 
 impl Space {
@@ -43,7 +44,7 @@ impl Space {
         turned
     }
 
-    /// The turns by which a known place is to be repeated, none among them.
+    /// The turns by which a place is to be repeated, none among them.
     pub(super) fn turns(&self, place: &Place) -> Vec<[i8; 2]> {
         if *self != Space::Angles {
             return vec![[0, 0]];
@@ -70,8 +71,8 @@ impl std::fmt::Display for Space {
         match self {
             Space::Angles => f.write_str("angles"),
             Space::Chords => f.write_str("chords"),
-            Space::Symmetric(Coordinates { power, weight }) => {
-                let name = if *power == 0.0 { "half" } else { "sum" };
+            Space::Symmetric(Coordinates { exponent, weight }) => {
+                let name = if *exponent == 0.0 { "half" } else { "sum" };
                 write!(f, "{name}={weight}")
             }
         }
@@ -83,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn azimuths_near_zero_are_known_on_both_sides() {
+    fn places_near_azimuth_zero_are_repeated_on_the_other_side() {
         let place = |phi_i, phi_v| {
             Space::Angles.place(
                 Direction::from_deg(30.0, phi_i).to_vec3(),

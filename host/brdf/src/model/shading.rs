@@ -1,8 +1,8 @@
 //! Many points of a surface under the same directional lights, seen by one viewer: what pictures
 //! are made of.
 
+use super::Brdf;
 use crate::direction::{Vec3, dot};
-use crate::model::Brdf;
 use rayon::prelude::*;
 
 /// Cosines below this are too near the horizon for a table that ends at 86°.
@@ -10,7 +10,7 @@ pub const LEAST_COSINE: f64 = 1e-3;
 
 /// How the material lies at a point of a surface: three unit vectors at right angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub struct TangentFrame {
     /// Along the material's x axis.
     pub tangent: Vec3,
     /// Along its y axis.
@@ -19,7 +19,7 @@ pub struct Frame {
     pub normal: Vec3,
 }
 
-impl Frame {
+impl TangentFrame {
     /// A vector in the material's own axes.
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         [
@@ -42,11 +42,11 @@ pub struct Light {
 /// The radiance of each point, one evaluation a light; what [`Brdf::shade`] is held to.
 pub fn shade_one_by_one<B: Brdf + ?Sized>(
     brdf: &B,
-    points: &[Frame],
+    points: &[TangentFrame],
     lights: &[Light],
     viewer: Vec3,
 ) -> Vec<[f32; 3]> {
-    let radiance = |point: &Frame| {
+    let radiance = |point: &TangentFrame| {
         let mut sum = [0.0; 3];
         let view = point.to_local(viewer);
         if view[2] < LEAST_COSINE {

@@ -1,0 +1,114 @@
+//! Three planes of cells, which many threads write to pair by pair of patches.
+
+use super::patches::Patch;
+use crate::grid::Grid;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Values of all cells, a plane a channel.
+pub(super) type Planes = [Vec<f32>; 3];
+
+/// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
+/// spare an argument about which thread owns which row.
+pub(super) struct SharedPlanes([Vec<AtomicU32>; 3]);
+
+impl SharedPlanes {
+    pub(super) fn new(length: usize) -> Self {
+        let plane = || (0..length).into_par_iter().map(|_| AtomicU32::new(0));
+        Self([(); 3].map(|()| plane().collect()))
+    }
+
+    /// Stores the cells of a pair, light by light.
+    pub(super) fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
+        let width = q.directions.len();
+        for (light, row) in p.directions.iter().zip(cells.chunks_exact(width)) {
+            for (first, view, length) in runs(q) {
+                let cells = &row[first..first + length];
+                self.store_run(grid.cell(*light as usize, view), cells.iter());
+            }
+        }
+    }
+
+    /// What [`Self::store`] stored.
+    pub(super) fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; 3]>) {
+        cells.clear();
+        for light in &p.directions {
+            for (_, view, length) in runs(q) {
+                let from = grid.cell(*light as usize, view);
+                let planes = [0, 1, 2].map(|c| &self.0[c][from..from + length]);
+                cells.extend(
+                    (0..length).map(|k| planes.map(|p| f32::from_bits(p[k].load(Relaxed)))),
+                );
+            }
+        }
+    }
+
+    /// Stores the cells of a pair and their mirror images. Within one patch both orders of a pair are
+    /// there; the first serves for both.
+    pub(super) fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
+        self.store(grid, (p, q), cells);
+        let (same, width) = (std::ptr::eq(p, q), q.directions.len());
+        for (b, view) in q.directions.iter().enumerate() {
+            for (first, light, length) in runs(p) {
+                let length = if same {
+                    length.min((b + 1).saturating_sub(first))
+                } else {
+                    length
+                };
+                let column = cells.iter().skip(first * width + b).step_by(width);
+                self.store_run(grid.cell(*view as usize, light), column.take(length));
+            }
+        }
+    }
+
+    /// Stores cells that follow each other.
+    fn store_run<'a>(&self, from: usize, cells: impl ExactSizeIterator<Item = &'a [f32; 3]>) {
+        let [red, green, blue] = [0, 1, 2].map(|c| &self.0[c][from..from + cells.len()]);
+        for (k, cell) in cells.enumerate() {
+            red[k].store(cell[0].to_bits(), Relaxed);
+            green[k].store(cell[1].to_bits(), Relaxed);
+            blue[k].store(cell[2].to_bits(), Relaxed);
+        }
+    }
+
+    pub(super) fn into_planes(self, grid: Grid) -> Planes {
+        self.0.map(|plane| {
+            // Same size and alignment: the vector is reused in place.
+            let mut plane: Vec<f32> = plane
+                .into_iter()
+                .map(|bits| f32::from_bits(bits.into_inner()))
+                .collect();
+            spread_poles(grid, &mut plane);
+            plane
+        })
+    }
+}
+
+/// Directions of a patch that follow each other: where the first stands in the patch, its number, and how
+/// many they are.
+fn runs(patch: &Patch) -> impl Iterator<Item = (usize, usize, usize)> {
+    let mut first = 0;
+    patch
+        .directions
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(move |run| {
+            let place = first;
+            first += run.len();
+            (place, run[0] as usize, run.len())
+        })
+}
+
+/// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
+pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
+    if plane.is_empty() {
+        return;
+    }
+    let (n, n_phi) = (grid.n_directions(), grid.n_phi());
+    for row in plane.chunks_exact_mut(n) {
+        let pole = row[0];
+        row[1..n_phi].fill(pole);
+    }
+    for row in 1..n_phi {
+        plane.copy_within(0..n, row * n);
+    }
+}
