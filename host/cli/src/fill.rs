@@ -103,6 +103,7 @@ impl Fill {
             nodes: self.nodes,
             tolerance: self.tolerance,
             with_errors: self.error.is_some(),
+            ..FillOptions::default()
         };
         let (grid, _) = options.check()?;
         check_writable_beside(&self.output)?;

@@ -9,6 +9,7 @@ use gonia_formats::dense_exr::read_dense;
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::samples::read_samples;
 use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model, five_digits, write_fit};
+use gonia_rig::Scale;
 use std::path::PathBuf;
 
 /// Fits a model to a dense BRDF by Levenberg and Marquardt's method from many random starts, all
@@ -97,7 +98,7 @@ impl Fit {
             &measured,
             &name,
             &cells,
-            self.model,
+            self.model.for_values(measured.scale == Scale::Relative),
             &settings,
             &progress.watch(),
         )

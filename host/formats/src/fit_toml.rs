@@ -48,7 +48,11 @@ pub struct FittedNumber {
 
 impl FitNote {
     /// The note of a fit.
-    pub fn new(fit: &FittedModel, seconds: f64, figures: Figures) -> Self {
+    pub fn new<F: ModelFamily + std::fmt::Display>(
+        fit: &FittedModel<F>,
+        seconds: f64,
+        figures: Figures,
+    ) -> Self {
         let numbers = fit.family.parameters().into_iter().enumerate();
         Self {
             model: fit.family.to_string(),

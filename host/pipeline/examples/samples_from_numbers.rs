@@ -12,15 +12,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (theta_i, phi_i) in around() {
         for (theta_v, phi_v) in around() {
             let f = glossy(theta_i, phi_i, theta_v, phi_v);
-            samples.push(Sample {
-                theta_i_deg: theta_i,
-                phi_i_deg: phi_i,
-                theta_v_deg: theta_v,
-                phi_v_deg: phi_v,
-                // One channel is three alike.
-                rgb: [f; 3],
-                frame: Sample::NO_FRAME,
-            });
+            let at = |theta: f32, phi: f32| Direction::from_deg(theta.into(), phi.into());
+            // One channel is three alike.
+            samples.push(Sample::new(at(theta_i, phi_i), at(theta_v, phi_v), [f; 3]));
         }
     }
     let set = SampleSet {

@@ -4,7 +4,9 @@ use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
-use gonia_brdf::interpolate::{self, ByRows, Calibration, Data, ErrorBars, FillSettings, Preset};
+use gonia_brdf::interpolate::{
+    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, Preset,
+};
 use gonia_brdf::{Bins, DenseBrdf, Grid};
 use gonia_formats::dense_exr::write_dense_by_rows;
 use gonia_rig::{DenseFile, SampleSet};
@@ -27,6 +29,8 @@ pub struct FillOptions {
     /// A block is refined where a finer one differs from it by more than this many times the noise
     /// of the samples, 0 ..= ∞; the preset's without it, or more where refining would cost too much.
     pub tolerance: Option<f32>,
+    /// The kernel of the blocks: [`Matern32`], or one of your own.
+    pub kernel: &'static dyn AnyKernel,
     /// Whether each cell gets a standard error.
     pub with_errors: bool,
 }
@@ -41,6 +45,7 @@ impl Default for FillOptions {
             block_deg: None,
             nodes: None,
             tolerance: None,
+            kernel: &Matern32,
             with_errors: false,
         }
     }
@@ -104,6 +109,7 @@ impl FillOptions {
                 .unwrap_or(preset.block_deg.max(2.0 * self.step_deg)),
             neighbours: self.nodes.unwrap_or(preset.neighbours),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
+            kernel: self.kernel,
             // Who asks for a tolerance gets it.
             budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
             ..preset

@@ -4,11 +4,12 @@ use crate::Error;
 use crate::compare::{Options, Side, Table, compare};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
-use gonia_brdf::fit::{self, Cell, FitSettings, StandardFamily};
+use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
 use gonia_brdf::{Bins, DenseBrdf, Sample};
 use gonia_formats::dense_exr::write_dense;
 use gonia_formats::fit_toml::FitNote;
 use gonia_rig::{DenseFile, Figures, Scale};
+use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
 
@@ -43,20 +44,20 @@ pub fn cells_of_samples(
     Ok(cells)
 }
 
-/// Fits a model to cells, tabulates it on the grid of `measured` and compares it with that. `name` is
+/// Fits a model, one of gonia's or of your own, to cells, tabulates it on the grid of `measured` and compares it with that. `name` is
 /// what the figures call `measured`.
 ///
 /// # Errors
 /// No positive value to fit, or none to compare.
-pub fn fit_model(
+pub fn fit_model<F: ModelFamily + Display>(
     measured: &DenseFile,
     name: &str,
     cells: &[Cell],
-    family: StandardFamily,
+    family: F,
     settings: &FitSettings,
     progress: &Progress<'_>,
 ) -> Result<FitResult, Error> {
-    let family = family.for_values(measured.scale == Scale::Relative);
+    let model_name = family.to_string();
     let start = Instant::now();
     let fit = step(progress, Step::FittingModel, |share| {
         fit::fit(cells, family, settings, share).map_err(Error::from)
@@ -68,7 +69,7 @@ pub fn fit_model(
         Ok::<_, Error>(DenseBrdf::tabulate(measured.brdf.grid(), model.as_ref()))
     })?;
     let figures = step(progress, Step::Comparing, |_| {
-        against(&dense, &family.to_string(), measured, name)
+        against(&dense, &model_name, measured, name)
     })?;
     let note = FitNote::new(&fit, seconds, figures);
     Ok(FitResult { note, dense })

@@ -260,6 +260,7 @@ impl Measurement {
         progress: &Progress<'_>,
     ) -> Result<(Rival, FitResult), Error> {
         let cells = cells_of_dense(&self.dense.brdf, settings);
+        let family = family.for_values(self.dense.scale == Scale::Relative);
         let result = fit_model(&self.dense, "dense.exr", &cells, family, settings, progress)?;
         let note = &result.note;
         let rival = Rival {
