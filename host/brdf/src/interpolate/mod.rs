@@ -44,7 +44,7 @@ pub struct FillSettings {
     /// A block is refined where a finer one differs from it by more than this many standard deviations
     /// of one sample: with 0 everywhere, with infinity nowhere.
     pub tolerance: f32,
-    /// What refinement may cost, in fine blocks a pair of patches, on average: [`select`] raises the
+    /// What refinement may cost, in fine blocks a pair of patches, on average: [`select()`] raises the
     /// tolerance to it.
     pub budget: f32,
     /// Size of a block's neighbourhood: so many data; three quarters of them in a coarse block that may be
@@ -95,7 +95,7 @@ impl Preset {
         }
     }
 
-    /// Its settings; [`select`] chooses the coordinates and measures the noise.
+    /// Its settings; [`select()`] chooses the coordinates and measures the noise.
     pub const fn settings(self) -> FillSettings {
         let (block_deg, tolerance, budget, neighbours, one_bin_in) = match self {
             Preset::Preview => (10.0, f32::INFINITY, 0.0, 64, 8),
@@ -120,7 +120,7 @@ impl Preset {
 }
 
 impl FillSettings {
-    /// What suits most materials; [`select`] finds what suits one.
+    /// What suits most materials; [`select()`] finds what suits one.
     pub const DEFAULT: FillSettings = Preset::Default.settings();
 
     /// Sizes of the patches, coarse to fine, degrees. Where none are refined, the corners of the fine ones

@@ -1,4 +1,4 @@
-//! The anisotropic Gaussian model of Ward (1992), the paper's reference [8].
+//! The anisotropic Gaussian model of Ward (1992), the paper's reference 8.
 //!
 //! `f = ρd/π + ρs exp(−tan²θh (cos²φh/αx² + sin²φh/αy²)) / (4π αx αy √((n·ωi)(n·ωv)))`.
 
