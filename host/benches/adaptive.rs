@@ -16,7 +16,9 @@ use gonia::evaluate::{Figures, Options, Side, Stratum, compare};
 use gonia::plan::Rings;
 use gonia::plan::adaptive::{Reach, propose};
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::interpolate::{Calibration, ErrorBars, Known, Settings, fill_with_errors, select};
+use gonia_brdf::interpolate::{
+    Calibration, Data, ErrorBars, FillSettings, fill_with_errors, select,
+};
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Pose, Sample};
 use rand_core::{Rng, SeedableRng};
@@ -128,8 +130,8 @@ fn judged(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
 
 fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars) {
     let bins = Bins::new(grid, &measure(model, poses));
-    let known = Known::new(&bins);
-    let settings = select(&known, Settings::DEFAULT).settings;
+    let known = Data::new(&bins);
+    let settings = select(&known, FillSettings::DEFAULT).settings;
     let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
     fill_with_errors(&known, &settings, &calibration, &|_| ()).expect("bins")
 }

@@ -10,10 +10,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use gonia_brdf::cellwise::{CellSettings, Predictor, Workspace};
+use gonia_brdf::baselines::{BaselineSettings, Predictor, Workspace};
 use gonia_brdf::direction::{Vec3, angle_between, dot, local_direction, normalize};
 use gonia_brdf::hemisphere::{Ring, directions};
-use gonia_brdf::interpolate::{self, Known, Origin, Settings};
+use gonia_brdf::interpolate::{self, Data, FillSettings, Origin};
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::{Bins, Brdf, Direction, Grid, Sample};
 use rayon::prelude::*;
@@ -394,12 +394,12 @@ fn judge_default(
     places: &[(usize, usize)],
     unsound: &mut Vec<String>,
 ) -> Option<Verdict> {
-    let base = Settings {
+    let base = FillSettings {
         block_deg: 2.0 * GRID_STEP_DEG,
-        nodes: row.neighbours.unwrap_or(Settings::DEFAULT.nodes),
-        ..Settings::DEFAULT
+        neighbours: row.neighbours.unwrap_or(FillSettings::DEFAULT.neighbours),
+        ..FillSettings::DEFAULT
     };
-    let known = Known::new(bins);
+    let known = Data::new(bins);
     let settings = interpolate::select(&known, base).settings;
     let dense = interpolate::fill(&known, &settings, &|_| ()).ok()?;
     let measured = |c: usize| {
@@ -454,7 +454,7 @@ fn judge_cellwise(
     places: &[(usize, usize)],
     name: &str,
 ) -> Option<Verdict> {
-    let mut settings: CellSettings = name.parse().unwrap();
+    let mut settings: BaselineSettings = name.parse().unwrap();
     // The nearest one is the nearest one.
     settings.neighbours = row.neighbours.unwrap_or(settings.neighbours);
     let predictor = Predictor::new(bins, &settings).ok()?;

@@ -9,9 +9,9 @@ use crate::dataset::error_exr::write_error_bars;
 use crate::dataset::samples::read_samples_of_all;
 use crate::dataset::{DenseFile, Scale, check_writable};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::cellwise::{self, CellSettings};
+use gonia_brdf::baselines::{self, BaselineSettings};
 use gonia_brdf::interpolate::{
-    self, ByRows, Calibration, ErrorBars, Known, Origin, Preset, Settings,
+    self, ByRows, Calibration, Data, ErrorBars, FillSettings, Origin, Preset,
 };
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ pub struct How {
 pub enum PresetArgument {
     /// A first look, a few seconds
     Preview,
-    /// Half the work of the default
+    /// Two thirds of the work of the default
     Fast,
     /// Accurate to the noise on most materials
     Default,
@@ -87,7 +87,7 @@ enum ScaleArgument {
 
 impl How {
     /// Grid and starting settings; one line when they make no sense.
-    pub fn check(&self) -> Result<(Grid, Settings)> {
+    pub fn check(&self) -> Result<(Grid, FillSettings)> {
         let grid = Grid::with_step_deg(self.step).context("--step")?;
         let preset = match self.preset {
             PresetArgument::Preview => Preset::Preview,
@@ -96,10 +96,10 @@ impl How {
             PresetArgument::Best => Preset::Best,
         }
         .settings();
-        let settings = Settings {
+        let settings = FillSettings {
             // Blocks of few cells share too little.
             block_deg: self.block.unwrap_or(preset.block_deg.max(2.0 * self.step)),
-            nodes: self.nodes.unwrap_or(preset.nodes),
+            neighbours: self.nodes.unwrap_or(preset.neighbours),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
             // Who asks for a tolerance gets it.
             budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
@@ -112,8 +112,8 @@ impl How {
                 self.step
             );
         }
-        if !(8..=1024).contains(&settings.nodes) {
-            bail!("--nodes {}: must lie in 8..=1024", settings.nodes);
+        if !(8..=1024).contains(&settings.neighbours) {
+            bail!("--nodes {}: must lie in 8..=1024", settings.neighbours);
         }
         if settings.tolerance.is_nan() || settings.tolerance < 0.0 {
             bail!(
@@ -138,14 +138,14 @@ pub struct Filled {
     /// Samples outside the grid.
     pub outside: usize,
     /// The settings, as chosen for the material.
-    pub settings: Settings,
+    pub settings: FillSettings,
 }
 
 /// Bins samples (and drops them), chooses the settings, and interpolates.
 pub fn fill(
     samples: Vec<Sample>,
     grid: Grid,
-    base: Settings,
+    base: FillSettings,
     with_errors: bool,
     progress: &mut Progress,
 ) -> Result<Filled> {
@@ -153,7 +153,7 @@ pub fn fill(
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
     let known = progress.stage("sorting", |_| {
-        anyhow::Ok(Known::thinned(&bins, base.one_bin_in))
+        anyhow::Ok(Data::thinned(&bins, base.one_bin_in))
     })?;
     let settings = progress.stage("choosing settings", |_| {
         anyhow::Ok(interpolate::select(&known, base).settings)
@@ -299,14 +299,14 @@ impl Fill {
         &self,
         samples: Vec<Sample>,
         grid: Grid,
-        base: Settings,
+        base: FillSettings,
         progress: &mut Progress,
     ) -> Result<()> {
         let total = samples.len();
         let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
         drop(samples);
         let known = progress.stage("sorting", |_| {
-            anyhow::Ok(Known::thinned(&bins, base.one_bin_in))
+            anyhow::Ok(Data::thinned(&bins, base.one_bin_in))
         })?;
         let settings = progress.stage("choosing settings", |_| {
             anyhow::Ok(interpolate::select(&known, base).settings)
@@ -346,14 +346,14 @@ impl Fill {
         &self,
         samples: Vec<Sample>,
         grid: Grid,
-        settings: &CellSettings,
+        settings: &BaselineSettings,
         progress: &mut Progress,
     ) -> Result<()> {
         let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
         drop(samples);
         let filled = progress
             .stage("interpolating", |tell| {
-                cellwise::fill(&bins, settings, tell)
+                baselines::fill(&bins, settings, tell)
             })
             .with_context(|| self.names())?;
         let mut provenance = of_this_program();
@@ -392,7 +392,7 @@ impl From<ScaleArgument> for Scale {
 }
 
 /// What a filled BRDF says of its making.
-pub fn provenance_of(settings: &Settings) -> Provenance {
+pub fn provenance_of(settings: &FillSettings) -> Provenance {
     let mut facts = of_this_program();
     facts.insert("interpolation".into(), settings.to_string());
     facts

@@ -10,7 +10,7 @@ use crate::dataset::{DenseFile, Scale, check_writable};
 use crate::evaluate::compare::Table;
 use crate::evaluate::{self, Figures, Options, Side};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::fit::{self, Cell, Family, Loss, Settings};
+use gonia_brdf::fit::{self, Cell, FitSettings, Loss, StandardFamily};
 use gonia_brdf::{Bins, DenseBrdf};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -30,7 +30,7 @@ pub struct Fit {
     samples: Option<PathBuf>,
     /// Which model to fit
     #[arg(long, value_name = "MODEL")]
-    model: Family,
+    model: StandardFamily,
     /// The fitted model as a dense BRDF, on the same grid (OpenEXR)
     #[arg(short, long, value_name = "FIT.exr")]
     output: Option<PathBuf>,
@@ -38,16 +38,16 @@ pub struct Fit {
     #[arg(long, value_enum, default_value = "log")]
     loss: LossArgument,
     /// Cells to fit to: half of them spread evenly, half where it is bright
-    #[arg(long, value_name = "N", default_value_t = Settings::default().cells)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().cells)]
     cells: usize,
     /// Random starts
-    #[arg(long, value_name = "N", default_value_t = Settings::default().starts)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().starts)]
     starts: usize,
     /// Most steps of a search
-    #[arg(long, value_name = "N", default_value_t = Settings::default().iterations)]
+    #[arg(long, value_name = "N", default_value_t = FitSettings::default().iterations)]
     iterations: usize,
     /// Seed of cells and starts
-    #[arg(long, default_value_t = Settings::default().seed)]
+    #[arg(long, default_value_t = FitSettings::default().seed)]
     seed: u64,
 }
 
@@ -68,7 +68,7 @@ pub struct FitResult {
 impl Fit {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let settings = Settings {
+        let settings = FitSettings {
             loss: match self.loss {
                 LossArgument::Log => Loss::Logarithm,
                 LossArgument::Cosine => Loss::Cosine,
@@ -149,8 +149,8 @@ pub fn fit_model(
     measured: &DenseFile,
     name: &str,
     cells: &[Cell],
-    family: Family,
-    settings: &Settings,
+    family: StandardFamily,
+    settings: &FitSettings,
     progress: &mut Progress,
 ) -> Result<FitResult> {
     let family = family.for_values(measured.scale == Scale::Relative);

@@ -1,6 +1,6 @@
 //! `--method`: by which method a grid is filled.
 
-use gonia_brdf::cellwise::{CellSettings, SettingsError};
+use gonia_brdf::baselines::{BaselineSettings, UnknownBaseline};
 use std::str::FromStr;
 
 /// A method by name.
@@ -9,13 +9,13 @@ pub enum Method {
     /// Blocks, with the settings that suit the material.
     Default,
     /// One cell at a time: `paper` and the others.
-    Cellwise(CellSettings),
+    Cellwise(BaselineSettings),
 }
 
 impl FromStr for Method {
-    type Err = SettingsError;
+    type Err = UnknownBaseline;
 
-    fn from_str(text: &str) -> Result<Self, SettingsError> {
+    fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
         if text == "default" {
             return Ok(Method::Default);
         }
@@ -30,7 +30,10 @@ mod tests {
     #[test]
     fn methods_have_names() {
         assert_eq!("default".parse(), Ok(Method::Default));
-        assert_eq!("paper".parse(), Ok(Method::Cellwise(CellSettings::PAPER)));
+        assert_eq!(
+            "paper".parse(),
+            Ok(Method::Cellwise(BaselineSettings::PAPER))
+        );
         assert!("papers".parse::<Method>().is_err());
     }
 }

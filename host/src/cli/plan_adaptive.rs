@@ -6,7 +6,7 @@ use crate::dataset::samples::read_samples_of_all;
 use crate::evaluate::chart::poses_of;
 use crate::plan::adaptive::{self, Proposal, Reach};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::interpolate::{Calibration, Known, Settings, fill_with_errors, select};
+use gonia_brdf::interpolate::{Calibration, Data, FillSettings, fill_with_errors, select};
 use gonia_brdf::{Bins, Grid};
 use gonia_protocol::settings::{Axis, Key};
 use std::path::PathBuf;
@@ -38,9 +38,9 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
     let grid = Grid::with_step_deg(STEP_DEG).context("the grid of the error bars")?;
     let bins = progress.stage("binning", |_| anyhow::Ok(Bins::new(grid, &samples)))?;
     drop(samples);
-    let known = Known::new(&bins);
+    let known = Data::new(&bins);
     let settings = progress.stage("choosing settings", |_| {
-        anyhow::Ok(select(&known, Settings::DEFAULT).settings)
+        anyhow::Ok(select(&known, FillSettings::DEFAULT).settings)
     })?;
     let calibration = progress
         .stage("calibrating error bars", |_| {

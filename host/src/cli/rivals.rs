@@ -15,8 +15,8 @@ use crate::evaluate::{self, Figures, Options, Side, Stratum, Tabulated};
 use crate::report::folder::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
 use crate::report::rivals::{Row, draw_row, figure};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::cellwise::CellSettings;
-use gonia_brdf::fit::{Family, Settings as FitSettings, draw};
+use gonia_brdf::baselines::BaselineSettings;
+use gonia_brdf::fit::{FitSettings, StandardFamily, draw};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -175,7 +175,10 @@ impl Rivals {
         comparison.rows.push(Rival { numbers, ..rival });
         session.write(path("strips.exr"), strips, "simulated strips on a cylinder")?;
 
-        for family in [Family::Kurt { lobes: 2 }, Family::Sadeghi { scaled: false }] {
+        for family in [
+            StandardFamily::Kurt { lobes: 2 },
+            StandardFamily::Sadeghi { scaled: false },
+        ] {
             let settings = FitSettings {
                 cells: self.cells,
                 starts: self.starts,
@@ -235,7 +238,7 @@ impl Session {
         let start = Instant::now();
         let table = progress.stage(&format!("{name}, {} degrees", grid.step_deg()), |_| {
             let bins = Bins::new(self.own_grid, samples);
-            fill_check_cells(&bins, &CellSettings::PAPER, grid)
+            fill_check_cells(&bins, &BaselineSettings::PAPER, grid)
         })?;
         // As if all cells took as long.
         let share = distinct(self.own_grid) / distinct(grid);

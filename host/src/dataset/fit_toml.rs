@@ -3,7 +3,7 @@
 use super::whole_file::write_whole_bytes;
 use super::{FileError, toml_text};
 use crate::evaluate::Figures;
-use gonia_brdf::fit::Fit;
+use gonia_brdf::fit::{FittedModel, ModelFamily};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,7 @@ pub struct FittedNumber {
 
 impl FitNote {
     /// The note of a fit.
-    pub fn new(fit: &Fit, seconds: f64, figures: Figures) -> Self {
+    pub fn new(fit: &FittedModel, seconds: f64, figures: Figures) -> Self {
         let numbers = fit.family.parameters().into_iter().enumerate();
         Self {
             model: fit.family.to_string(),

@@ -6,7 +6,7 @@
 //! line), for all such points.
 
 use gonia_brdf::direction::{Vec3, dot};
-use gonia_brdf::shading::{Frame, LEAST_COSINE, Light};
+use gonia_brdf::model::shading::{LEAST_COSINE, Light, TangentFrame};
 use gonia_brdf::{DenseBrdf, Direction, Grid};
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ pub fn shade(
     table: &DenseBrdf,
     rows: Rows,
     factor: f32,
-    points: &[Frame],
+    points: &[TangentFrame],
     lights: &[Light],
     viewer: Vec3,
 ) -> Vec<[f32; 3]> {
@@ -88,7 +88,7 @@ pub fn shade(
 fn look_up(
     table: &DenseBrdf,
     rows: Rows,
-    frame: &Frame,
+    frame: &TangentFrame,
     lights: &[Light],
     viewer: Vec3,
 ) -> [f32; 3] {
@@ -180,13 +180,13 @@ impl Gathered {
     }
 
     /// The radiance of a point whose view has these weights in the four rows.
-    fn radiance(&mut self, frame: &Frame, lights: &Lights, weights: [f32; 4]) -> [f32; 3] {
+    fn radiance(&mut self, frame: &TangentFrame, lights: &Lights, weights: [f32; 4]) -> [f32; 3] {
         let sum = self.lit(frame, lights);
         [0, 1, 2].map(|c| (0..4).map(|row| weights[row] * sum[4 * row + c]).sum())
     }
 
     /// The sum over the lights of irradiance times value, in the four rows.
-    fn lit(&mut self, frame: &Frame, lights: &Lights) -> [f32; 16] {
+    fn lit(&mut self, frame: &TangentFrame, lights: &Lights) -> [f32; 16] {
         let Gathered { grid, nodes, local } = self;
         turn(*grid, frame, lights, local);
         let (last, n_phi) = (grid.n_theta() - 1, grid.n_phi());
@@ -224,7 +224,7 @@ impl Gathered {
 
 /// The lights in a point's frame: cosine, and elevation and azimuth in steps of the grid.
 #[inline(always)]
-fn turn(grid: Grid, frame: &Frame, lights: &Lights, local: &mut [Vec<f32>; 3]) {
+fn turn(grid: Grid, frame: &TangentFrame, lights: &Lights, local: &mut [Vec<f32>; 3]) {
     let n = lights.irradiance.len();
     for array in &mut *local {
         array.resize(n, 0.0);

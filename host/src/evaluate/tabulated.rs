@@ -2,7 +2,7 @@
 
 use super::shade::{Rows, shade};
 use gonia_brdf::direction::Vec3;
-use gonia_brdf::shading::{Frame, Light};
+use gonia_brdf::model::shading::{Light, TangentFrame};
 use gonia_brdf::{Brdf, DenseBrdf, Direction};
 
 /// A dense BRDF looked up between its nodes, times a factor.
@@ -51,7 +51,7 @@ impl Brdf for Tabulated<'_> {
 
     /// What pictures are made of. Of a reciprocal table the view is taken as the row, so that all of a
     /// point's values are near each other in memory.
-    fn shade(&self, points: &[Frame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
+    fn shade(&self, points: &[TangentFrame], lights: &[Light], viewer: Vec3) -> Vec<[f32; 3]> {
         let rows = if self.is_reciprocal {
             Rows::View
         } else {
@@ -66,7 +66,7 @@ impl Brdf for Tabulated<'_> {
 mod tests {
     use super::*;
     use gonia_brdf::Grid;
-    use gonia_brdf::shading::shade_one_by_one;
+    use gonia_brdf::model::shading::shade_one_by_one;
 
     #[test]
     fn light_and_view_are_told_apart_where_it_matters() {
@@ -103,7 +103,7 @@ mod tests {
         let even = DenseBrdf::from_fn(grid, |i, v| skewed.at(i.min(v), i.max(v)));
         let at = |t: f64, p: f64| Direction::from_deg(t, p).to_vec3();
         // Six points near each other, at a hundred places.
-        let points: Vec<Frame> = (0..600)
+        let points: Vec<TangentFrame> = (0..600)
             .map(|k| {
                 let (place, beside) = (k / 6, f64::from(k % 6));
                 let t = f64::from(place % 60) * 1.7 + 0.1 * beside;
@@ -112,7 +112,7 @@ mod tests {
                 let (lean, across) = (t.to_radians().sin_cos(), p.to_radians().sin_cos());
                 let down = [lean.1, 0.0, -lean.0];
                 let mix = |a: f64, b: f64| [a * down[0], b, a * down[2]];
-                Frame {
+                TangentFrame {
                     tangent: mix(across.1, across.0),
                     bitangent: mix(-across.0, across.1),
                     normal: [lean.0, 0.0, lean.1],

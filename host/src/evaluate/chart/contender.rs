@@ -1,10 +1,10 @@
 //! The methods that are compared.
 
 use super::cpu::cpu_seconds;
-use gonia_brdf::cellwise::{
-    CellFiller, CellSettings, Rule, SettingsError, Workspace, n_interpolated,
+use gonia_brdf::baselines::{
+    BaselineFiller, BaselineSettings, Rule, UnknownBaseline, Workspace, n_interpolated,
 };
-use gonia_brdf::interpolate::{self, FillError, Known, Preset, Settings};
+use gonia_brdf::interpolate::{self, Data, FillError, FillSettings, Preset};
 use gonia_brdf::{Bins, Grid};
 use rayon::prelude::*;
 use std::fmt;
@@ -14,9 +14,9 @@ use std::str::FromStr;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Contender {
     /// One cell at a time.
-    Cellwise(CellSettings),
+    Cellwise(BaselineSettings),
     /// Block by block, with these settings to begin with; the material's own are chosen.
-    Blocks(Settings),
+    Blocks(FillSettings),
 }
 
 /// What kind of method it is: the colours of the chart.
@@ -131,12 +131,12 @@ pub fn standard(grid: Grid) -> Vec<Contender> {
 impl Contender {
     /// What `gonia fill` does on a grid by itself.
     pub fn default_of(grid: Grid) -> Self {
-        Self::blocks(Settings::DEFAULT, grid)
+        Self::blocks(FillSettings::DEFAULT, grid)
     }
 
     /// Blocks, of two steps of the grid at least.
-    fn blocks(settings: Settings, grid: Grid) -> Self {
-        Contender::Blocks(Settings {
+    fn blocks(settings: FillSettings, grid: Grid) -> Self {
+        Contender::Blocks(FillSettings {
             block_deg: settings.block_deg.max(2.0 * grid.step_deg()),
             ..settings
         })
@@ -144,7 +144,7 @@ impl Contender {
 
     /// The paper's method.
     pub fn paper() -> Self {
-        Contender::Cellwise(CellSettings::PAPER)
+        Contender::Cellwise(BaselineSettings::PAPER)
     }
 
     /// Whether it is [`Contender::default_of`].
@@ -176,11 +176,11 @@ impl Contender {
 
 fn run_cellwise(
     bins: &Bins,
-    settings: &CellSettings,
+    settings: &BaselineSettings,
     cells: &[(u32, u32)],
 ) -> Result<Run, FillError> {
     let start = cpu_seconds();
-    let filler = CellFiller::new(bins, settings)?;
+    let filler = BaselineFiller::new(bins, settings)?;
     let built = cpu_seconds();
     let values = cells
         .par_iter()
@@ -202,9 +202,9 @@ fn run_cellwise(
     })
 }
 
-fn run_blocks(bins: &Bins, base: &Settings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
+fn run_blocks(bins: &Bins, base: &FillSettings, cells: &[(u32, u32)]) -> Result<Run, FillError> {
     let start = cpu_seconds();
-    let known = Known::thinned(bins, base.one_bin_in);
+    let known = Data::thinned(bins, base.one_bin_in);
     let settings = interpolate::select(&known, *base).settings;
     let dense = interpolate::fill(&known, &settings, &|_| ())?;
     let core_s = cpu_seconds() - start;
@@ -222,9 +222,9 @@ impl fmt::Display for Contender {
         match self {
             Contender::Cellwise(settings) => settings.fmt(f),
             Contender::Blocks(settings) => {
-                let Settings {
+                let FillSettings {
                     block_deg,
-                    nodes,
+                    neighbours: nodes,
                     tolerance,
                     budget,
                     one_bin_in,
@@ -244,10 +244,10 @@ impl fmt::Display for Contender {
 }
 
 impl FromStr for Contender {
-    type Err = SettingsError;
+    type Err = UnknownBaseline;
 
     /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
-    fn from_str(text: &str) -> Result<Self, SettingsError> {
+    fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
             let (nodes, rest) = rest.split_once(",tolerance=")?;
@@ -258,13 +258,13 @@ impl FromStr for Contender {
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
             let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
             let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
-            Some(Contender::Blocks(Settings {
+            Some(Contender::Blocks(FillSettings {
                 block_deg,
-                nodes,
+                neighbours: nodes,
                 tolerance,
                 budget,
                 one_bin_in,
-                ..Settings::DEFAULT
+                ..FillSettings::DEFAULT
             }))
         };
         blocks().map_or_else(|| text.parse().map(Contender::Cellwise), Ok)

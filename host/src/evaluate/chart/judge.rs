@@ -133,7 +133,7 @@ impl Judge {
             })
             .filter(|ratio| ratio.is_finite())
             .collect();
-        judge.factor = f64::from(gonia_brdf::bins::median(&mut ratios)).exp();
+        judge.factor = f64::from(gonia_brdf::quantile::median(&mut ratios)).exp();
         judge.draw_truth(truth);
         judge.finish(truth.scale)?;
         judge.basis = format!(

@@ -1,6 +1,6 @@
 //! The material bent around an upright cylinder, as it is photographed (the paper's Fig. 6).
 
-use super::{Frame, Light, Picture};
+use super::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
 
 /// Draws what fills the outline of a smooth upright cylinder seen from the side: the picture's left
@@ -12,7 +12,7 @@ pub fn bent(brdf: &dyn Brdf, lights: &[Light], size: (usize, usize), turn_deg: f
         let forwards = (1.0 - x * x).max(0.0).sqrt();
         let (around, up) = ([forwards, 0.0, -x], [0.0, 1.0, 0.0]);
         let mix = |a: f64, b: f64| [0, 1, 2].map(|k| a * around[k] + b * up[k]);
-        Some(Frame {
+        Some(TangentFrame {
             tangent: mix(turn_cos, turn_sin),
             bitangent: mix(-turn_sin, turn_cos),
             normal: [x, 0.0, forwards],

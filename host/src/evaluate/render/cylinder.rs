@@ -1,6 +1,6 @@
 //! An upright cylinder with the material draped around it: flat at the top, in folds below.
 
-use super::{Frame, Light, Picture};
+use super::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
 use gonia_brdf::direction::{dot, normalize};
 
@@ -62,7 +62,7 @@ fn front_azimuth(x: f64, y: f64) -> Option<f64> {
 }
 
 /// The frame of the point (r sin α, y, r cos α).
-fn frame_at(azimuth: f64, y: f64) -> Frame {
+fn frame_at(azimuth: f64, y: f64) -> TangentFrame {
     let (r, r_azimuth, r_y) = radius(azimuth, y);
     let (s, c) = azimuth.sin_cos();
     let around = normalize([r_azimuth * s + r * c, 0.0, r_azimuth * c - r * s]);
@@ -78,7 +78,7 @@ fn frame_at(azimuth: f64, y: f64) -> Frame {
         around[2] * bitangent[0] - around[0] * bitangent[2],
         around[0] * bitangent[1] - around[1] * bitangent[0],
     ];
-    Frame {
+    TangentFrame {
         tangent: around,
         bitangent,
         normal,

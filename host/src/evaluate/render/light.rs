@@ -1,7 +1,7 @@
 //! Directional lights.
 
 use gonia_brdf::direction::{Vec3, normalize};
-use gonia_brdf::shading::Light;
+use gonia_brdf::model::shading::Light;
 use std::f64::consts::PI;
 
 /// A single light from above the camera, 40° from the line of sight.

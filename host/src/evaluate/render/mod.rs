@@ -13,13 +13,13 @@ mod sphere;
 pub use bent::bent;
 pub use cylinder::cylinder;
 pub use environment::Environment;
-pub use gonia_brdf::shading::Light;
+pub use gonia_brdf::model::shading::Light;
 pub use light::{from_above, single, studio};
 pub use picture::Picture;
 pub use sphere::sphere;
 
 use gonia_brdf::direction::Vec3;
-use gonia_brdf::shading::Frame;
+use gonia_brdf::model::shading::TangentFrame;
 
 /// Towards the viewer.
 const VIEWER: Vec3 = [0.0, 0.0, 1.0];

@@ -3,7 +3,7 @@
 use super::VIEWER;
 use crate::evaluate::color::luminance;
 use gonia_brdf::Brdf;
-use gonia_brdf::shading::{Frame, Light};
+use gonia_brdf::model::shading::{Light, TangentFrame};
 use rayon::prelude::*;
 
 /// Points that are shaded together: enough that a table's rows are read once for many of them, few
@@ -31,7 +31,7 @@ impl Picture {
         lights: &[Light],
         (width, height): (usize, usize),
         side: usize,
-        frame_at: impl Fn(f64, f64) -> Option<Frame> + Sync,
+        frame_at: impl Fn(f64, f64) -> Option<TangentFrame> + Sync,
     ) -> Self {
         let place = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / (n * side) as f64 - 1.0;
         let frame = |point: usize| {
@@ -46,8 +46,8 @@ impl Picture {
         let band = (POINTS_AT_ONCE / (side * side)).max(1);
         for first in (0..n).step_by(band) {
             let points = first * side * side..n.min(first + band) * side * side;
-            let frames: Vec<Option<Frame>> = points.into_par_iter().map(frame).collect();
-            let seen: Vec<Frame> = frames.iter().copied().flatten().collect();
+            let frames: Vec<Option<TangentFrame>> = points.into_par_iter().map(frame).collect();
+            let seen: Vec<TangentFrame> = frames.iter().copied().flatten().collect();
             let mut shaded = brdf.shade(&seen, lights, VIEWER).into_iter();
             for pixel in frames.chunks_exact(side * side) {
                 let hits = pixel.iter().flatten().count();

@@ -1,6 +1,6 @@
 //! A sphere covered with the material.
 
-use super::{Frame, Light, Picture};
+use super::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
 use gonia_brdf::direction::Vec3;
 
@@ -19,13 +19,13 @@ pub fn sphere(brdf: &dyn Brdf, lights: &[Light], px: usize, side: usize) -> Pict
 }
 
 /// The frame at a point of the unit sphere that is not a pole.
-fn frame_at(normal: Vec3) -> Frame {
+fn frame_at(normal: Vec3) -> TangentFrame {
     let [x, y, z] = normal;
     // up × normal, and normal × tangent.
     let s = 1.0 / x.hypot(z).max(1e-12);
     let tangent = [z * s, 0.0, -x * s];
     let bitangent = [-x * y * s, (x * x + z * z) * s, -y * z * s];
-    Frame {
+    TangentFrame {
         tangent,
         bitangent,
         normal,
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn the_frame_is_right_handed_and_points_right_and_up_in_front() {
         for normal in [[0.0, 0.0, 1.0], [0.6, 0.48, 0.64], [-0.6, -0.64, 0.48]] {
-            let Frame {
+            let TangentFrame {
                 tangent: t,
                 bitangent: b,
                 normal: n,

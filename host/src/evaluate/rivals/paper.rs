@@ -1,6 +1,6 @@
 //! The paper's interpolation on a share of the cells: all of them take core-hours.
 
-use gonia_brdf::cellwise::{CellFiller, CellSettings, Workspace};
+use gonia_brdf::baselines::{BaselineFiller, BaselineSettings, Workspace};
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::{Bins, DenseBrdf, Grid};
 use rayon::prelude::*;
@@ -28,10 +28,10 @@ pub fn coarse(dense: &DenseBrdf, grid: Grid) -> DenseBrdf {
 /// Too few bins.
 pub fn fill_check_cells(
     bins: &Bins,
-    settings: &CellSettings,
+    settings: &BaselineSettings,
     grid: Grid,
 ) -> Result<DenseBrdf, FillError> {
-    let filler = CellFiller::new(bins, settings)?;
+    let filler = BaselineFiller::new(bins, settings)?;
     let n = grid.n_directions();
     let rows: Vec<Vec<[f32; 3]>> = (0..n)
         .into_par_iter()
@@ -99,7 +99,7 @@ mod tests {
         }
         let bins = Bins::new(fine, &samples);
         let grid = Grid::with_step_deg(30.0).unwrap();
-        let found = fill_check_cells(&bins, &CellSettings::PAPER, grid).unwrap();
+        let found = fill_check_cells(&bins, &BaselineSettings::PAPER, grid).unwrap();
         let truth = DenseBrdf::tabulate(grid, &model);
         let pairs = found.planes()[1].iter().zip(&truth.planes()[1]);
         let sum: f32 = pairs.map(|(a, b)| (a / b).ln().powi(2)).sum();
