@@ -15,6 +15,7 @@ use gonia_brdf::direction::{Vec3, angle_between, dot, local_direction, normalize
 use gonia_brdf::hemisphere::{Ring, directions};
 use gonia_brdf::interpolate::{self, Data, FillSettings, Origin};
 use gonia_brdf::model::{Kurt, KurtLobe};
+use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Brdf, Direction, Grid, Sample};
 use rayon::prelude::*;
 
@@ -53,6 +54,7 @@ struct Row {
     bound: f64,
 }
 
+// long: a table, one entry a row.
 fn rows() -> Vec<Row> {
     let row = |case, truth: Box<dyn Brdf>, samples, tested, bound| Row {
         case,
@@ -394,7 +396,7 @@ fn judge_default(
     };
     let known = Data::new(bins);
     let settings = interpolate::select(&known, base).settings;
-    let dense = interpolate::fill(&known, &settings, &|_| ()).ok()?;
+    let dense = interpolate::fill(&known, &settings, &silent).ok()?;
     let measured = |c: usize| {
         bins.bins()
             .iter()

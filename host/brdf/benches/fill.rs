@@ -21,6 +21,7 @@ use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{
     Calibration, Data, FillSettings, Preset, fill, fill_with_errors, select,
 };
+use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Brdf, Grid};
 use plan::{Poses, cpu_seconds, material, measure_with};
 use rayon::prelude::*;
@@ -110,7 +111,7 @@ fn run(name: &str, arguments: &Arguments) {
         settings.kernel_weight = arguments.number("--kernel", 0.3);
     }
     let (cpu, start) = (cpu_seconds(), Instant::now());
-    let dense = fill(&data, &settings, &|_| ()).expect("enough bins");
+    let dense = fill(&data, &settings, &silent).expect("enough bins");
     let (fill_cpu, fill_s) = (cpu_seconds() - cpu, start.elapsed().as_secs_f64());
     if arguments.has("--errors") {
         errors(&data, &settings, &*model);
@@ -210,7 +211,7 @@ fn errors(data: &Data, settings: &FillSettings, model: &dyn Brdf) {
     let cpu = cpu_seconds();
     let calibration = Calibration::new(data, settings).expect("enough frames");
     let calibrate_s = cpu_seconds() - cpu;
-    let (dense, bars) = fill_with_errors(data, settings, &calibration, &|_| ()).expect("bins");
+    let (dense, bars) = fill_with_errors(data, settings, &calibration, &silent).expect("bins");
     let fill_s = cpu_seconds() - cpu - calibrate_s;
     println!("  error bars: calibration {calibrate_s:.1} CPU-s, fill {fill_s:.1} CPU-s");
     let fold = Fold::new(data.bins(), 3, 24, 8000).expect("enough frames");

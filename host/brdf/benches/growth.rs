@@ -9,6 +9,7 @@
 mod plan;
 
 use gonia_brdf::interpolate::{ByRows, Data, FillSettings, fill, select};
+use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Grid};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
@@ -82,14 +83,18 @@ fn measure_row(samples: usize, step: f64) {
     let settings = select(&data, settings).settings;
     let choosing = lap();
     if grid.n_cells() > CELLS_IN_MEMORY {
-        let rows = ByRows::new(&data, &settings, &|_| ()).expect("enough bins");
-        rows.each_row(&|_| (), &|_, row| match row[0][0] {
-            value if value > 0.0 => Ok(()),
-            value => Err(value),
-        })
+        let rows = ByRows::new(&data, &settings, &silent).expect("enough bins");
+        rows.each_row(
+            &silent,
+            &|_, row| match row[0][0] {
+                value if value > 0.0 => Ok(()),
+                value => Err(value),
+            },
+            || f32::NAN,
+        )
         .expect("positive values");
     } else {
-        drop(fill(&data, &settings, &|_| ()).expect("enough bins"));
+        drop(fill(&data, &settings, &silent).expect("enough bins"));
     }
     let filling = lap();
     println!(

@@ -4,6 +4,7 @@
 //! ```
 //! use gonia_brdf::hemisphere::{paper_lights, paper_views};
 //! use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
+//! use gonia_brdf::progress::silent;
 //! use gonia_brdf::{Bins, Direction, Grid, Sample};
 //!
 //! // Samples as a rig measures them; here of a Lambertian surface, one a pose, of every fifth pose.
@@ -17,7 +18,7 @@
 //! let bins = Bins::new(Grid::with_step_deg(15.0)?, &samples);
 //! let data = Data::new(&bins);
 //! let base = FillSettings { block_deg: 30.0, ..FillSettings::DEFAULT };
-//! let dense = fill(&data, &select(&data, base).settings, &|_| ())?;
+//! let dense = fill(&data, &select(&data, base).settings, &silent)?;
 //! let value = dense.lookup(Direction::from_deg(33.0, 10.0), Direction::from_deg(20.0, 200.0));
 //! assert!((value[1] - 0.2).abs() < 1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -31,6 +32,7 @@
 //! | [`baselines`] | the paper's method and other known ones, one cell at a time |
 //! | [`dense`] | a BRDF at every pair of directions of a grid |
 //! | [`model`], [`fit`] | analytic models; their parameters, fitted to a table or to bins |
+//! | [`progress`] | what a caller hears of work that takes long |
 //! | [`quantile`], [`random`] | medians; random numbers that are the same everywhere |
 //!
 //! Conventions: θ is the polar angle from the sample's normal, φ the azimuth, anticlockwise from the
@@ -45,6 +47,7 @@ pub mod grid;
 pub mod hemisphere;
 pub mod interpolate;
 pub mod model;
+pub mod progress;
 pub mod quantile;
 pub mod random;
 pub mod sample;

@@ -11,6 +11,7 @@ use gonia_brdf::fit::{
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate;
 use gonia_brdf::model::Material;
+use gonia_brdf::progress::silent;
 use gonia_brdf::random::Random;
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Sample};
 use std::time::Instant;
@@ -145,7 +146,7 @@ fn run(case: &Case, grid: Grid, settings: &FitSettings) -> (FittedModel, Vec<f64
     let dense = noisy(model.as_ref(), grid);
     let start = Instant::now();
     let cells = draw(&dense, settings.cells, settings.seed);
-    let found = fit(&cells, case.family, settings, &|_| ()).unwrap();
+    let found = fit(&cells, case.family, settings, &silent).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let deviations = deviations(case, &found.values);
     (found, deviations, seconds)
@@ -236,7 +237,7 @@ fn interpolated(bins: &Bins) -> DenseBrdf {
         noise_variance: (NOISE * NOISE) as f32,
         ..interpolate::FillSettings::DEFAULT
     };
-    interpolate::fill(&interpolate::Data::new(bins), &base, &|_| ()).unwrap()
+    interpolate::fill(&interpolate::Data::new(bins), &base, &silent).unwrap()
 }
 
 /// Deviations of the fits of several sessions in units of their uncertainties, number by number.
@@ -257,7 +258,7 @@ fn in_uncertainties(
                 ..FitSettings::default()
             };
             let cells = cells_of(&bins, &settings);
-            let found = fit(&cells, case.family, &settings, &|_| ()).unwrap();
+            let found = fit(&cells, case.family, &settings, &silent).unwrap();
             let each = case.family.parameters().into_iter().enumerate();
             each.map(|(k, p)| {
                 let off = found.values[k] - case.truth[k];

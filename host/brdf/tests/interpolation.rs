@@ -12,6 +12,7 @@ use gonia_brdf::interpolate::{
     origins, select,
 };
 use gonia_brdf::model::{Brdf, Ggx, Kurt, KurtLobe, Ward};
+use gonia_brdf::progress::silent;
 use gonia_brdf::random::Random;
 use gonia_brdf::{Bins, DenseBrdf, Direction, Grid, Sample};
 
@@ -194,8 +195,8 @@ fn every_cell_has_an_error_and_knows_where_its_value_is_from() {
         ..FillSettings::DEFAULT
     };
     let calibration = Calibration::new(&data, &settings).unwrap();
-    let (dense, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
-    assert_eq!(dense, fill(&data, &settings, &|_| ()).unwrap());
+    let (dense, bars) = fill_with_errors(&data, &settings, &calibration, &silent).unwrap();
+    assert_eq!(dense, fill(&data, &settings, &silent).unwrap());
     for plane in &bars.standard_error {
         assert!(plane.iter().all(|e| e.is_finite() && *e >= 0.0));
     }
@@ -228,7 +229,7 @@ fn a_gap_in_azimuth_is_extrapolated() {
         ..FillSettings::DEFAULT
     };
     let calibration = Calibration::new(&data, &settings).unwrap();
-    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
+    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &silent).unwrap();
     let origin = |i: (f64, f64), v: (f64, f64)| {
         let at = |(theta, phi)| grid.nearest(theta, phi).unwrap();
         bars.origin[grid.cell(at(i), at(v))]
@@ -321,7 +322,7 @@ fn on_few_poses_presets_choose_alike_and_the_slower_is_the_nearer() {
             "{chosen:?}"
         );
         let errors = chosen.map(|settings| {
-            let dense = fill(&data, &settings, &|_| ()).unwrap();
+            let dense = fill(&data, &settings, &silent).unwrap();
             interior_error(&dense, &*model)
         });
         println!("{errors:?}");
@@ -366,7 +367,7 @@ fn blocks_leave_no_seams_whole_or_refined() {
             noise_variance: (NOISE * NOISE) as f32,
             ..FillSettings::DEFAULT
         };
-        let dense = fill(&data, &settings, &|_| ()).unwrap();
+        let dense = fill(&data, &settings, &silent).unwrap();
         let (across, inside) = bends(&dense, &model, settings.block_deg);
         println!("tolerance {tolerance}: bends of {across:.5} across borders, {inside:.5} inside");
         // 1.6 times where blending may shift blocks by their usual difference only.
@@ -478,7 +479,7 @@ fn a_kernel_of_ones_own_fills_as_well_as_the_default_and_is_named() {
     let data = Data::new(&bins);
     let filled = |base: FillSettings| {
         let settings = select(&data, base).settings;
-        let dense = fill(&data, &settings, &|_| ()).unwrap();
+        let dense = fill(&data, &settings, &silent).unwrap();
         (settings, interior_error(&dense, &model), dense)
     };
     let base = FillSettings {
@@ -503,7 +504,7 @@ fn a_kernel_of_ones_own_fills_as_well_as_the_default_and_is_named() {
     );
     // And its error bars are its own.
     let calibration = Calibration::new(&data, &settings).unwrap();
-    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &|_| ()).unwrap();
+    let (_, bars) = fill_with_errors(&data, &settings, &calibration, &silent).unwrap();
     assert!(
         bars.standard_error[1]
             .iter()

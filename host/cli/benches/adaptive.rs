@@ -16,6 +16,7 @@ use gonia_brdf::interpolate::{
     Calibration, Data, ErrorBars, FillSettings, fill_with_errors, select,
 };
 use gonia_brdf::model::{Kurt, KurtLobe};
+use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Pose, Sample};
 use gonia_pipeline::compare::Table;
 use gonia_pipeline::{Options, Side, compare};
@@ -136,7 +137,7 @@ fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars
     let known = Data::new(&bins);
     let settings = select(&known, FillSettings::DEFAULT).settings;
     let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
-    fill_with_errors(&known, &settings, &calibration, &|_| ()).expect("bins")
+    fill_with_errors(&known, &settings, &calibration, &silent).expect("bins")
 }
 
 /// The plan nearest to `n` poses with lights and views equally dense, in rings.

@@ -5,6 +5,7 @@ use crate::exr_planes::{ExrPlanes, Plane};
 use crate::exr_rows::{RowReader, write_rows};
 use crate::{FileError, exr_planes};
 use gonia_brdf::interpolate::ByRows;
+use gonia_brdf::progress::Progress;
 use gonia_brdf::{DenseBrdf, Direction, Grid};
 use gonia_rig::{DenseFile, Scale};
 use rayon::prelude::*;
@@ -57,11 +58,12 @@ pub fn write_dense_by_rows(
     rows: &ByRows<'_>,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<(), FileError> {
     let attributes = attributes_of(scale, provenance);
     write_rows(path, grid.n_directions(), &attributes, |writer| {
-        rows.each_row(progress, &|light, row| writer.write(light, row))
+        let cancelled = || std::io::Error::other("cancelled");
+        rows.each_row(progress, &|light, row| writer.write(light, row), cancelled)
     })
 }
 

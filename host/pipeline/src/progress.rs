@@ -74,21 +74,28 @@ const INSIDE: std::ops::RangeInclusive<f64> = 1e-9..=1.0 - 1e-9;
 pub(crate) fn step<T, E: From<Cancelled>>(
     progress: &Progress<'_>,
     step: Step,
-    work: impl FnOnce(&(dyn Fn(f64) + Sync)) -> Result<T, E>,
+    work: impl FnOnce(&gonia_brdf::progress::Progress<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     if progress(step, 0.0).is_break() {
         return Err(Cancelled.into());
     }
     let is_cancelled = AtomicBool::new(false);
-    let value = work(&|share: f64| {
-        if progress(step, share.clamp(*INSIDE.start(), *INSIDE.end())).is_break() {
+    let result = work(&|share: f64| {
+        let heard = progress(step, share.clamp(*INSIDE.start(), *INSIDE.end()));
+        if heard.is_break() {
             is_cancelled.store(true, Relaxed);
         }
-    })?;
-    if is_cancelled.into_inner() || progress(step, 1.0).is_break() {
+        heard
+    });
+    // Work that was cancelled may end with any error, or come to its end all the same.
+    if is_cancelled.into_inner() {
         return Err(Cancelled.into());
     }
-    Ok(value)
+    let value = result?;
+    match progress(step, 1.0) {
+        ControlFlow::Continue(()) => Ok(value),
+        ControlFlow::Break(()) => Err(Cancelled.into()),
+    }
 }
 
 #[cfg(test)]
@@ -104,8 +111,7 @@ mod tests {
             ControlFlow::Continue(())
         };
         let value = step::<_, Cancelled>(&progress, Step::Binning, |tell| {
-            tell(0.0);
-            tell(1.0);
+            assert!(tell(0.0).is_continue() && tell(1.0).is_continue());
             Ok(3)
         });
         assert_eq!(value, Ok(3));
@@ -122,7 +128,7 @@ mod tests {
                 false => ControlFlow::Continue(()),
             };
             let result = step::<_, Cancelled>(&progress, Step::Binning, |tell| {
-                tell(0.5);
+                let _ = tell(0.5);
                 Ok(())
             });
             assert_eq!(result, Err(Cancelled));

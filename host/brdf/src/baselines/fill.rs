@@ -7,7 +7,9 @@ use crate::dense::DenseBrdf;
 use crate::grid::Grid;
 use crate::interpolate::FillError;
 use crate::interpolate::planes::spread_poles;
+use crate::progress::Progress;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
 /// A filled grid, and how it went.
@@ -28,11 +30,11 @@ pub struct BaselineFill {
 /// thread.
 ///
 /// # Errors
-/// Too few bins.
+/// Too few bins, or cancelled.
 pub fn fill(
     bins: &Bins,
     settings: &BaselineSettings,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<BaselineFill, FillError> {
     let filler = BaselineFiller::new(bins, settings)?;
     let grid = bins.grid();
@@ -47,14 +49,17 @@ pub fn fill(
         // Rows get shorter; hand them out one by one.
         .with_max_len(1)
         .filter(|(light, _)| !is_pole_again(grid, *light))
-        .for_each_init(Workspace::default, |work, (light, ((red, green), blue))| {
+        .try_for_each_init(Workspace::default, |work, (light, ((red, green), blue))| {
             for view in (light..n).filter(|view| !is_pole_again(grid, *view)) {
                 let value = filler.pair(light, view, work);
                 (red[view], green[view], blue[view]) = (value[0], value[1], value[2]);
             }
             let cells = done.fetch_add(n - light, Relaxed) + n - light;
-            progress((2.0 * cells as f64 / (n * (n + 1)) as f64).min(1.0));
-        });
+            match progress((2.0 * cells as f64 / (n * (n + 1)) as f64).min(1.0)) {
+                ControlFlow::Continue(()) => Ok(()),
+                ControlFlow::Break(()) => Err(FillError::Cancelled),
+            }
+        })?;
     for plane in &mut planes {
         mirror(n, plane);
         spread_poles(grid, plane);
@@ -208,6 +213,7 @@ fn mirror(n: usize, plane: &mut [f32]) {
 mod tests {
     use super::*;
     use crate::model::{Brdf, Kurt};
+    use crate::progress::silent;
     use crate::sample::Sample;
 
     /// Every third cell of a grid without those whose light is a pole, in their own frames.
@@ -250,7 +256,11 @@ mod tests {
             "mls2,mirrored",
         ] {
             let settings: BaselineSettings = name.parse().unwrap();
-            let filled = fill(&bins, &settings, &|share| assert!(share <= 1.0)).unwrap();
+            let heard = |share| {
+                assert!(share <= 1.0);
+                std::ops::ControlFlow::Continue(())
+            };
+            let filled = fill(&bins, &settings, &heard).unwrap();
             assert_eq!((filled.failed, filled.raised), (0, 0), "{name}");
             let dense = &filled.dense;
             for light in 0..n {
@@ -288,7 +298,7 @@ mod tests {
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().unwrap();
-            pool.install(|| fill(&samples, &BaselineSettings::PAPER, &|_| ()).unwrap())
+            pool.install(|| fill(&samples, &BaselineSettings::PAPER, &silent).unwrap())
         };
         assert_eq!(with(1), with(3));
     }
@@ -316,7 +326,7 @@ mod tests {
     fn overshoot_below_zero_is_raised_and_counted() {
         let grid = Grid::with_step_deg(30.0).unwrap();
         let spike = bins(grid, &Spike);
-        let filled = fill(&spike, &"rbf-cubic,nugget=0,k=30".parse().unwrap(), &|_| ()).unwrap();
+        let filled = fill(&spike, &"rbf-cubic,nugget=0,k=30".parse().unwrap(), &silent).unwrap();
         assert!(filled.raised > 0);
         let least = filled.dense.planes()[0]
             .iter()

@@ -10,6 +10,7 @@ use std::sync::Arc;
 /// crate; one of your own is fitted in the same way:
 ///
 /// ```
+/// use gonia_brdf::progress::silent;
 /// use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, Range, Values, draw, fit};
 /// use gonia_brdf::{Brdf, DenseBrdf, Grid, Vec3};
 ///
@@ -46,7 +47,7 @@ use std::sync::Arc;
 /// let truth = Minnaert { albedo: [0.3, 0.2, 0.1], k: 1.3 };
 /// let dense = DenseBrdf::tabulate(Grid::with_step_deg(15.0)?, &truth);
 /// let settings = FitSettings { cells: 400, starts: 4, ..FitSettings::default() };
-/// let found = fit(&draw(&dense, settings.cells, 1), MinnaertFamily, &settings, &|_| ())?;
+/// let found = fit(&draw(&dense, settings.cells, 1), MinnaertFamily, &settings, &silent)?;
 /// assert!((found.values.get("k").unwrap() - 1.3).abs() < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -18,10 +18,12 @@ pub use range::Range;
 pub use standard::{StandardFamily, UnknownFamily};
 
 use crate::model::Brdf;
+use crate::progress::Progress;
 use crate::random::Random;
 use least_squares::{Minimum, minimise};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 /// What is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,6 +94,9 @@ pub enum FitError {
         "the family makes no model of its own parameters; check that their names are the same in both"
     )]
     NoModel,
+    /// The caller's progress callback ended the work.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// Cells and steps of the first look from each start.
@@ -111,11 +116,10 @@ pub fn fit<F: ModelFamily>(
     cells: &[Cell],
     family: F,
     settings: &FitSettings,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<FittedModel<F>, FitError> {
     let problem = Problem::new(cells, &family, settings.loss)?;
-    let (best, agreeing_starts) = search_from_many_starts(&problem, settings, progress);
-    progress(1.0);
+    let (best, agreeing_starts) = search_from_many_starts(&problem, settings, progress)?;
     let values = family.canonical(problem.named.with(&problem.values(&best.at)));
     let uncertainties = uncertainty::standard(&problem, &values);
     Ok(FittedModel {
@@ -134,8 +138,12 @@ pub fn fit<F: ModelFamily>(
 fn search_from_many_starts(
     problem: &Problem<'_>,
     settings: &FitSettings,
-    progress: &(dyn Fn(f64) + Sync),
-) -> (Minimum, usize) {
+    progress: &Progress<'_>,
+) -> Result<(Minimum, usize), FitError> {
+    let heard = |share: f64| match progress(share) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(FitError::Cancelled),
+    };
     let done = std::sync::atomic::AtomicUsize::new(0);
     let starts: Vec<u64> = (0..settings.starts.max(1) as u64).collect();
     let mut first: Vec<Minimum> = starts
@@ -151,10 +159,10 @@ fn search_from_many_starts(
                 settings.iterations.min(FIRST_ITERATIONS),
             );
             let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-            progress(0.5 * count as f64 / starts.len() as f64);
-            found
+            heard(0.5 * count as f64 / starts.len() as f64)?;
+            Ok(found)
         })
-        .collect();
+        .collect::<Result<_, _>>()?;
     first.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     first.truncate(SECOND_STARTS);
     let mut second: Vec<Minimum> = first
@@ -169,7 +177,7 @@ fn search_from_many_starts(
         })
         .collect();
     second.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    progress(0.8);
+    heard(0.8)?;
     let best_cost = second.first().map_or(f64::INFINITY, |m| m.cost);
     let agreeing_starts = second
         .iter()
@@ -177,7 +185,8 @@ fn search_from_many_starts(
         .count();
     let start = second.swap_remove(0).at;
     let best = problem.search(start, problem.cells.len(), settings.iterations);
-    (best, agreeing_starts)
+    heard(1.0)?;
+    Ok((best, agreeing_starts))
 }
 
 impl<F: ModelFamily> FittedModel<F> {

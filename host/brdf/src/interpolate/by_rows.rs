@@ -10,8 +10,10 @@ use super::data::Data;
 use super::exponential::exponentials;
 use super::fill::{FillError, Task};
 use super::refine::Refiner;
+use crate::progress::Progress;
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A fill of which the rows are still to be made.
@@ -36,10 +38,10 @@ impl<'a> ByRows<'a> {
     pub fn new(
         data: &'a Data,
         settings: &'a FillSettings,
-        progress: &(dyn Fn(f64) + Sync),
+        progress: &Progress<'_>,
     ) -> Result<Self, FillError> {
         let task = Task::new(data, settings)?;
-        let corners = task.solve_pairs(false, progress, &|_, _| ());
+        let corners = task.solve_pairs(false, progress, &|_, _| ())?;
         Ok(Self { task, corners })
     }
 
@@ -47,11 +49,12 @@ impl<'a> ByRows<'a> {
     /// no order and from several threads. A thread holds the rows of one patch.
     ///
     /// # Errors
-    /// The first of `take`'s.
+    /// The first of `take`'s; or `cancelled`'s, when `progress` ends the work.
     pub fn each_row<E: Send>(
         &self,
-        progress: &(dyn Fn(f64) + Sync),
+        progress: &Progress<'_>,
         take: &(impl Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
+        cancelled: impl Fn() -> E + Sync,
     ) -> Result<(), E> {
         let grid = self.task.grid;
         let (n, n_phi) = (grid.n_directions(), grid.n_phi());
@@ -85,8 +88,10 @@ impl<'a> ByRows<'a> {
                         take(*light as usize + azimuth, row)?;
                     }
                 }
-                progress((done.fetch_add(1, Relaxed) + 1) as f64 / patches.len() as f64);
-                Ok(())
+                match progress((done.fetch_add(1, Relaxed) + 1) as f64 / patches.len() as f64) {
+                    ControlFlow::Continue(()) => Ok(()),
+                    ControlFlow::Break(()) => Err(cancelled()),
+                }
             })
     }
 
@@ -126,6 +131,7 @@ mod tests {
     use crate::bins::Bins;
     use crate::grid::Grid;
     use crate::model::{Brdf, Kurt};
+    use crate::progress::silent;
     use crate::sample::Sample;
     use std::sync::Mutex;
 
@@ -161,18 +167,22 @@ mod tests {
             ..FillSettings::DEFAULT
         };
         let data = Data::new(&bins);
-        let dense = fill(&data, &settings, &|_| ()).unwrap();
+        let dense = fill(&data, &settings, &silent).unwrap();
         let n = grid.n_directions();
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
-        ByRows::new(&data, &settings, &|_| ())
+        ByRows::new(&data, &settings, &silent)
             .unwrap()
-            .each_row(&|_| (), &|light, row| {
-                let mut planes = planes.lock().map_err(|_| ())?;
-                for c in 0..3 {
-                    planes[c][light * n..(light + 1) * n].copy_from_slice(row[c]);
-                }
-                Ok::<(), ()>(())
-            })
+            .each_row(
+                &silent,
+                &|light, row| {
+                    let mut planes = planes.lock().map_err(|_| ())?;
+                    for c in 0..3 {
+                        planes[c][light * n..(light + 1) * n].copy_from_slice(row[c]);
+                    }
+                    Ok::<(), ()>(())
+                },
+                || (),
+            )
             .unwrap();
         assert_eq!(dense.planes(), &planes.into_inner().unwrap());
     }

@@ -12,8 +12,10 @@ use super::planes::{Planes, SharedPlanes};
 use super::refine::{Refiner, Solved};
 use crate::dense::DenseBrdf;
 use crate::grid::Grid;
+use crate::progress::Progress;
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Fewer filled bins than this say nothing about a four-dimensional function.
@@ -25,6 +27,9 @@ pub enum FillError {
     /// Too little to go by.
     #[error("only {0} bins are filled, and at least {MIN_BINS} are needed: measure more poses")]
     TooFewBins(usize),
+    /// The caller's progress callback ended the work.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// Interpolates every cell of the bins' grid. Positive, finite, exactly reciprocal, one value a
@@ -35,7 +40,7 @@ pub enum FillError {
 pub fn fill(
     data: &Data,
     settings: &FillSettings,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<DenseBrdf, FillError> {
     Ok(DenseBrdf::from_planes(
         data.bins().grid(),
@@ -51,7 +56,7 @@ pub fn fill_with_errors(
     data: &Data,
     settings: &FillSettings,
     calibration: &Calibration,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<(DenseBrdf, ErrorBars), FillError> {
     let bins = data.bins();
     let grid = bins.grid();
@@ -68,7 +73,7 @@ fn solve(
     data: &Data,
     settings: &FillSettings,
     calibration: Option<&Calibration>,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &Progress<'_>,
 ) -> Result<(Planes, Planes), FillError> {
     let task = Task::new(data, settings)?;
     let (grid, patches) = (task.grid, &task.cover.patches);
@@ -92,7 +97,7 @@ fn solve(
                 .collect();
             errors.store(grid, (p, q), &relative);
         }
-    });
+    })?;
     // Then, shifted to what they agree on with their neighbours, the values.
     (0..patches.len())
         .into_par_iter()
@@ -149,12 +154,15 @@ impl<'a> Task<'a> {
     }
 
     /// Solves all pairs of patches, gives each to `each`, and averages at their corners.
+    ///
+    /// # Errors
+    /// Cancelled.
     pub(super) fn solve_pairs(
         &self,
         with_variances: bool,
-        progress: &(dyn Fn(f64) + Sync),
+        progress: &Progress<'_>,
         each: &(dyn Fn(Solved<'_>, (&Patch, &Patch)) + Sync),
-    ) -> Corners {
+    ) -> Result<Corners, FillError> {
         let patches = &self.cover.patches;
         let pairs = patches.len() * (patches.len() + 1) / 2;
         let done = AtomicUsize::new(0);
@@ -174,11 +182,14 @@ impl<'a> Task<'a> {
                     each(solved, pair);
                 }
                 let before = done.fetch_add(patches.len() - p, Relaxed);
-                progress((before + patches.len() - p) as f64 / pairs as f64);
-                (at_corners, smooth)
+                match progress((before + patches.len() - p) as f64 / pairs as f64) {
+                    ControlFlow::Continue(()) => Ok((at_corners, smooth)),
+                    ControlFlow::Break(()) => Err(FillError::Cancelled),
+                }
             })
-            .collect();
-        Corners::new(&self.cover, at_corners, self.settings.blend_limit())
+            .collect::<Result<_, _>>()?;
+        let limit = self.settings.blend_limit();
+        Ok(Corners::new(&self.cover, at_corners, limit))
     }
 }
 
@@ -197,6 +208,7 @@ mod tests {
     use crate::bins::Bins;
     use crate::direction::Direction;
     use crate::model::{Brdf, Kurt};
+    use crate::progress::silent;
     use crate::sample::Sample;
 
     fn samples(model: &dyn Brdf, n: usize) -> Vec<Sample> {
@@ -242,7 +254,7 @@ mod tests {
             block_deg: 20.0,
             ..FillSettings::DEFAULT
         };
-        let dense = fill(&Data::new(&coarse), &settings, &|_| ()).unwrap();
+        let dense = fill(&Data::new(&coarse), &settings, &silent).unwrap();
         let n = grid.n_directions();
         let mut sum = 0.0;
         for light in 0..n {
@@ -269,8 +281,27 @@ mod tests {
         let model = Kurt::white_reference_fabric();
         let bins = Bins::new(Grid::PAPER, &samples(&model, 7));
         assert_eq!(
-            fill(&Data::new(&bins), &FillSettings::DEFAULT, &|_| ()),
+            fill(&Data::new(&bins), &FillSettings::DEFAULT, &silent),
             Err(FillError::TooFewBins(7))
         );
+    }
+
+    #[test]
+    fn a_break_ends_the_fill_early() {
+        let grid = Grid::with_step_deg(15.0).unwrap();
+        let bins = Bins::new(grid, &samples(&Kurt::two_thread_fabric(), 500));
+        let data = Data::new(&bins);
+        let settings = FillSettings {
+            block_deg: 30.0,
+            ..FillSettings::DEFAULT
+        };
+        let heard = AtomicUsize::new(0);
+        let cancelled = fill(&data, &settings, &|_| {
+            heard.fetch_add(1, Relaxed);
+            ControlFlow::Break(())
+        });
+        assert_eq!(cancelled, Err(FillError::Cancelled));
+        let all = cover(grid, &settings.patch_sizes_deg()).patches.len();
+        assert!(heard.into_inner() < all);
     }
 }
