@@ -12,14 +12,10 @@ mod drawing;
 
 use drawing::{Line, draw};
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::interpolate::{
-    Calibration, Data, ErrorBars, FillSettings, fill_with_errors, select,
-};
+use gonia_brdf::interpolate::{ErrorBars, FillSettings};
 use gonia_brdf::model::{Kurt, KurtLobe};
-use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Pose, Sample};
-use gonia_pipeline::compare::Table;
-use gonia_pipeline::{Options, Side, compare};
+use gonia_pipeline::{Options, Side, Table, compare, fill_bins, silent};
 use gonia_plan::Rings;
 use gonia_plan::adaptive::{Reach, propose};
 use gonia_rig::{Figures, Scale, Stratum};
@@ -134,10 +130,8 @@ fn compared(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
 
 fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars) {
     let bins = Bins::new(grid, &measure(model, poses));
-    let known = Data::new(&bins);
-    let settings = select(&known, FillSettings::DEFAULT).settings;
-    let calibration = Calibration::new(&known, &settings).expect("frames to hold out");
-    fill_with_errors(&known, &settings, &calibration, &silent).expect("bins")
+    let filled = fill_bins(&bins, FillSettings::DEFAULT, true, &silent).expect("enough frames");
+    (filled.dense, filled.errors.expect("error bars"))
 }
 
 /// The plan nearest to `n` poses with lights and views equally dense, in rings.
@@ -177,14 +171,7 @@ fn measure(model: &dyn Brdf, poses: &[Pose]) -> Vec<Sample> {
                     .eval(l, v)
                     .map(|value| (value * (1.0 + NOISE * normal(&mut random))) as f32);
                 let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-                Sample {
-                    theta_i_deg: l.theta_deg() as f32,
-                    phi_i_deg: l.phi_deg() as f32,
-                    theta_v_deg: v.theta_deg() as f32,
-                    phi_v_deg: v.phi_deg() as f32,
-                    rgb,
-                    frame: frame as u32,
-                }
+                Sample::new(l, v, rgb).in_frame(frame as u32)
             })
             .collect()
     };
