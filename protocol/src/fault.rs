@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Why a controller latched. A number rather than an enum, so that a host can show the code of a
+/// A latched fault. A number rather than an enum, so that a host can show the code of a
 /// newer firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FaultCode(pub u16);
 
-/// What a person needs to know about a fault.
+/// A fault: symptom, cause, remedy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultPage {
     /// The code.
@@ -36,16 +36,17 @@ impl FaultCode {
     pub const HOME_SWITCH_STUCK: Self = Self(6);
     /// The switch and the encoder disagree about where home is.
     pub const HOME_MISMATCH: Self = Self(7);
-    /// The host was silent while the arm moved or was armed.
-    pub const LEASE_EXPIRED: Self = Self(8);
+    /// No packet of the host came while the arm moved or was armed, for longer than the host watchdog
+    /// allows.
+    pub const HOST_WATCHDOG: Self = Self(8);
     /// The wired interlock or the emergency stop opened.
     pub const INTERLOCK_OPEN: Self = Self(9);
     /// Stored settings were damaged; defaults are in use.
     pub const SETTINGS_DAMAGED: Self = Self(10);
     /// Settings could not be written to the board's memory.
     pub const SETTINGS_NOT_SAVED: Self = Self(11);
-    /// At rest, steps and encoder, both counted from home, disagree.
-    pub const STEPS_DISAGREE: Self = Self(12);
+    /// At rest, steps and encoder, both counted from home, differ by more than the step-loss limit.
+    pub const STEP_LOSS: Self = Self(12);
 
     /// Every fault that exists, in the order of its number.
     pub const PAGES: [FaultPage; 12] = [
@@ -70,8 +71,8 @@ impl FaultCode {
         page(
             Self::NOT_REACHED,
             "target not reached within the allowed corrections",
-            "vibration, a loose gear, or a deadband below what the encoder resolves",
-            "remove the vibration, tighten the gear, or widen the deadband; clear the fault",
+            "vibration, a loose gear, or an in-position window below what the encoder resolves",
+            "remove the vibration, tighten the gear, or widen in_position_window; clear the fault",
         ),
         page(
             Self::HOME_NOT_FOUND,
@@ -92,8 +93,8 @@ impl FaultCode {
             "put the switch back or calibrate encoder_zero, clear the fault, home",
         ),
         page(
-            Self::LEASE_EXPIRED,
-            "host silent while moving or armed; arm stopped",
+            Self::HOST_WATCHDOG,
+            "host watchdog expired while moving or armed; arm stopped",
             "host busy, crashed or unplugged",
             "reconnect, clear the fault; no homing needed",
         ),
@@ -116,10 +117,10 @@ impl FaultCode {
             "save again; replace the board if it returns",
         ),
         page(
-            Self::STEPS_DISAGREE,
-            "steps and encoder disagree at rest",
+            Self::STEP_LOSS,
+            "steps and encoder differ at rest by more than step_loss_limit",
             "steps lost, gear slipped, more backlash than backlash_takeup, or an encoder that shifted or was never calibrated",
-            "clear the fault, home: the switch tells which is right; if it returns, calibrate the encoder or raise backlash_takeup",
+            "clear the fault, home: the switch shows which is right; if it returns, calibrate the encoder or raise backlash_takeup",
         ),
     ];
 
@@ -133,7 +134,7 @@ impl FaultCode {
         !matches!(
             self,
             Self::NOT_REACHED
-                | Self::LEASE_EXPIRED
+                | Self::HOST_WATCHDOG
                 | Self::SETTINGS_DAMAGED
                 | Self::SETTINGS_NOT_SAVED
         )

@@ -5,21 +5,21 @@
 //! comes; the [`Responder`] keeps its last answer, so that a repeat is answered and not executed
 //! again. Ids rise; one that is not newer than the last is a stray that was long under way.
 
-use crate::frame::{FrameBytes, Header, TooLong, encode};
 use crate::message::Message;
+use crate::packet::{Header, PacketBytes, TooLong, encode};
 
 /// When a requester repeats and gives up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
+pub struct RetryPolicy {
     /// Time to the first repeat, µs.
     pub retry_us: u64,
     /// Sends of one request, the first included.
     pub tries: u32,
 }
 
-impl Default for Patience {
-    /// 50 ms and 20 tries: a frame takes 3 ms at 921,600 baud, and a second is long enough to say
-    /// that nobody is there.
+impl Default for RetryPolicy {
+    /// 50 ms and 20 tries: a packet takes 3 ms at 921,600 baud, and after a second
+    /// nobody is there.
     fn default() -> Self {
         Self {
             retry_us: 50_000,
@@ -32,7 +32,7 @@ impl Default for Patience {
 #[derive(Debug)]
 pub struct Requester {
     node: u8,
-    patience: Patience,
+    retry: RetryPolicy,
     last_id: u16,
     pending: Option<Pending>,
     repeats: u32,
@@ -41,14 +41,14 @@ pub struct Requester {
 #[derive(Debug)]
 struct Pending {
     id: u16,
-    frame: FrameBytes,
+    packet: PacketBytes,
     due_us: u64,
     tries_left: u32,
 }
 
-/// What a requester wants.
+/// What a requester has to do next.
 #[derive(Debug, PartialEq)]
-pub enum Wish<'a> {
+pub enum NextAction<'a> {
     /// No request is under way.
     Nothing,
     /// Wait for bytes until this time.
@@ -59,23 +59,23 @@ pub enum Wish<'a> {
     GiveUp,
 }
 
-/// What a frame is to a requester.
+/// What a packet is to a requester.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum IncomingPacket {
     /// The answer that it waits for; the request is over.
     Answer,
     /// An event.
     Event,
-    /// Neither: the second answer to a repeated request, or a frame of another node.
+    /// Neither: the second answer to a repeated request, or a packet of another node.
     Stray,
 }
 
 impl Requester {
     /// A requester for one controller; ids count on from `first_id`.
-    pub fn new(node: u8, first_id: u16, patience: Patience) -> Self {
+    pub fn new(node: u8, first_id: u16, retry: RetryPolicy) -> Self {
         Self {
             node,
-            patience,
+            retry,
             last_id: first_id,
             pending: None,
             repeats: 0,
@@ -101,51 +101,51 @@ impl Requester {
     pub fn begin(&mut self, message: &Message, now_us: u64) -> Result<(u16, &[u8]), TooLong> {
         // 0 is the id of events.
         self.last_id = self.last_id.checked_add(1).unwrap_or(1);
-        let frame = encode(self.node, self.last_id, message)?;
+        let packet = encode(self.node, self.last_id, message)?;
         let pending = self.pending.insert(Pending {
             id: self.last_id,
-            frame,
-            due_us: now_us + self.patience.retry_us,
-            tries_left: self.patience.tries.saturating_sub(1),
+            packet,
+            due_us: now_us + self.retry.retry_us,
+            tries_left: self.retry.tries.saturating_sub(1),
         });
-        Ok((pending.id, &pending.frame))
+        Ok((pending.id, &pending.packet))
     }
 
     /// What to do at this time.
-    pub fn poll(&mut self, now_us: u64) -> Wish<'_> {
+    pub fn poll(&mut self, now_us: u64) -> NextAction<'_> {
         let Some(pending) = &mut self.pending else {
-            return Wish::Nothing;
+            return NextAction::Nothing;
         };
         if now_us < pending.due_us {
-            return Wish::WaitUntil(pending.due_us);
+            return NextAction::WaitUntil(pending.due_us);
         }
         if pending.tries_left == 0 {
             self.pending = None;
-            return Wish::GiveUp;
+            return NextAction::GiveUp;
         }
         pending.tries_left -= 1;
-        pending.due_us = now_us + self.patience.retry_us;
+        pending.due_us = now_us + self.retry.retry_us;
         self.repeats += 1;
         match &self.pending {
-            Some(pending) => Wish::Repeat(&pending.frame),
-            None => Wish::Nothing,
+            Some(pending) => NextAction::Repeat(&pending.packet),
+            None => NextAction::Nothing,
         }
     }
 
-    /// Sorts an incoming frame by its header.
-    pub fn sort(&mut self, header: &Header) -> Role {
+    /// Sorts an incoming packet by its header.
+    pub fn sort(&mut self, header: &Header) -> IncomingPacket {
         if self.node != crate::NODE_ANY && header.node != self.node {
-            return Role::Stray;
+            return IncomingPacket::Stray;
         }
         if header.kind >= 0xC0 {
-            return Role::Event;
+            return IncomingPacket::Event;
         }
         match &self.pending {
             Some(pending) if header.kind >= 0x80 && header.request == pending.id => {
                 self.pending = None;
-                Role::Answer
+                IncomingPacket::Answer
             }
-            _ => Role::Stray,
+            _ => IncomingPacket::Stray,
         }
     }
 }
@@ -155,12 +155,12 @@ impl Requester {
 pub struct Responder {
     session: Option<u32>,
     last_id: u16,
-    last_answer: FrameBytes,
+    last_answer: PacketBytes,
 }
 
 /// What a request is to a responder.
 #[derive(Debug, PartialEq)]
-pub enum Arrival<'a> {
+pub enum IncomingRequest<'a> {
     /// Execute it, then [`Responder::answer`].
     New,
     /// It was executed before: send this answer again.
@@ -170,12 +170,12 @@ pub enum Arrival<'a> {
 }
 
 impl Responder {
-    /// A responder that has heard nobody yet.
+    /// A responder without a session.
     pub const fn new() -> Self {
         Self {
             session: None,
             last_id: 0,
-            last_answer: FrameBytes::new(),
+            last_answer: PacketBytes::new(),
         }
     }
 
@@ -185,14 +185,14 @@ impl Responder {
     }
 
     /// Sorts an incoming request.
-    pub fn sort(&self, id: u16) -> Arrival<'_> {
+    pub fn sort(&self, id: u16) -> IncomingRequest<'_> {
         if self.last_answer.is_empty() {
-            return Arrival::New;
+            return IncomingRequest::New;
         }
         match id.wrapping_sub(self.last_id) as i16 {
-            0 => Arrival::Repeat(&self.last_answer),
-            newer if newer > 0 => Arrival::New,
-            _ => Arrival::Stray,
+            0 => IncomingRequest::Repeat(&self.last_answer),
+            newer if newer > 0 => IncomingRequest::New,
+            _ => IncomingRequest::Stray,
         }
     }
 
@@ -218,7 +218,7 @@ impl Responder {
 mod tests {
     use super::*;
 
-    const PATIENCE: Patience = Patience {
+    const RETRY: RetryPolicy = RetryPolicy {
         retry_us: 100,
         tries: 3,
     };
@@ -234,61 +234,61 @@ mod tests {
 
     #[test]
     fn a_request_is_repeated_and_then_given_up() {
-        let mut link = Requester::new(1, 0, PATIENCE);
+        let mut link = Requester::new(1, 0, RETRY);
         let (_, first) = link.begin(&Message::Home, 0).unwrap();
-        let first = FrameBytes::from_slice(first).unwrap();
-        assert_eq!(link.poll(99), Wish::WaitUntil(100));
-        assert_eq!(link.poll(100), Wish::Repeat(&first));
-        assert_eq!(link.poll(200), Wish::Repeat(&first));
-        assert_eq!(link.poll(300), Wish::GiveUp);
-        assert_eq!(link.poll(301), Wish::Nothing);
+        let first = PacketBytes::from_slice(first).unwrap();
+        assert_eq!(link.poll(99), NextAction::WaitUntil(100));
+        assert_eq!(link.poll(100), NextAction::Repeat(&first));
+        assert_eq!(link.poll(200), NextAction::Repeat(&first));
+        assert_eq!(link.poll(300), NextAction::GiveUp);
+        assert_eq!(link.poll(301), NextAction::Nothing);
         assert_eq!(link.repeats(), 2);
     }
 
     #[test]
     fn only_the_answer_to_the_request_under_way_ends_it() {
-        let mut link = Requester::new(1, 41, PATIENCE);
+        let mut link = Requester::new(1, 41, RETRY);
         let (id, _) = link.begin(&Message::Home, 0).unwrap();
         assert_eq!(id, 42);
-        assert_eq!(link.sort(&header(0x83, 41)), Role::Stray);
-        assert_eq!(link.sort(&header(0xC1, 42)), Role::Event);
+        assert_eq!(link.sort(&header(0x83, 41)), IncomingPacket::Stray);
+        assert_eq!(link.sort(&header(0xC1, 42)), IncomingPacket::Event);
         assert_eq!(
             link.sort(&Header {
                 node: 2,
                 ..header(0x83, 42)
             }),
-            Role::Stray
+            IncomingPacket::Stray
         );
-        assert_eq!(link.sort(&header(0x83, 42)), Role::Answer);
-        assert_eq!(link.sort(&header(0x83, 42)), Role::Stray);
+        assert_eq!(link.sort(&header(0x83, 42)), IncomingPacket::Answer);
+        assert_eq!(link.sort(&header(0x83, 42)), IncomingPacket::Stray);
     }
 
     #[test]
     fn a_repeat_gets_the_same_answer_and_an_old_one_none() {
         let mut device = Responder::new();
         assert!(device.hello(5));
-        assert_eq!(device.sort(9), Arrival::New);
+        assert_eq!(device.sort(9), IncomingRequest::New);
         let answer =
-            FrameBytes::from_slice(device.answer(1, 9, &Message::Accepted).unwrap()).unwrap();
-        assert_eq!(device.sort(9), Arrival::Repeat(&answer));
-        assert_eq!(device.sort(8), Arrival::Stray);
-        assert_eq!(device.sort(10), Arrival::New);
+            PacketBytes::from_slice(device.answer(1, 9, &Message::Accepted).unwrap()).unwrap();
+        assert_eq!(device.sort(9), IncomingRequest::Repeat(&answer));
+        assert_eq!(device.sort(8), IncomingRequest::Stray);
+        assert_eq!(device.sort(10), IncomingRequest::New);
         assert!(
             !device.hello(5),
             "a repeated Hello does not start a new session"
         );
-        assert_eq!(device.sort(9), Arrival::Repeat(&answer));
+        assert_eq!(device.sort(9), IncomingRequest::Repeat(&answer));
         assert!(device.hello(6));
-        assert_eq!(device.sort(1), Arrival::New);
+        assert_eq!(device.sort(1), IncomingRequest::New);
     }
 
     #[test]
     fn ids_go_round_without_using_the_id_of_events() {
-        let mut link = Requester::new(1, u16::MAX - 1, PATIENCE);
+        let mut link = Requester::new(1, u16::MAX - 1, RETRY);
         assert_eq!(link.begin(&Message::Home, 0).unwrap().0, u16::MAX);
         assert_eq!(link.begin(&Message::Home, 0).unwrap().0, 1);
         let mut device = Responder::new();
         device.answer(1, u16::MAX, &Message::Accepted).unwrap();
-        assert_eq!(device.sort(1), Arrival::New);
+        assert_eq!(device.sort(1), IncomingRequest::New);
     }
 }

@@ -1,7 +1,7 @@
 //! Every message, its kind and its body.
 //!
 //! Kinds below 0x80 go from host to controller, 0x80 … 0xBF answer one of those, 0xC0 and above are
-//! events, which nobody asked for. All angles are absolute, in µdeg; all times are µs since the
+//! events, which come without a request. All angles are absolute, in µdeg; all times are µs since the
 //! controller's start. Kinds and layouts of `Hello`, `Identity`, `Stop` and `EStop` are frozen for
 //! ever; the others are held by the golden bytes in this crate's tests.
 
@@ -69,21 +69,21 @@ messages! {
         0x02 GetStatus,
         /// Decelerate and stop. Valid in every state, answered whatever the version.
         0x03 Stop,
-        /// Stop at once and latch. Valid in every state, answered whatever the version.
+        /// Stop at once with a latched fault. Valid in every state, answered whatever the version.
         0x04 EStop,
-        /// Renews the lease; never answered.
+        /// Restarts the host watchdog; never answered.
         0x05 Heartbeat,
         /// Leaves the fault or the emergency stop, if its cause is gone.
         0x06 ClearFault,
         /// Homes both axes.
         0x07 Home,
-        /// Starts the armed train.
+        /// Starts the train of pulses that was requested.
         0x0A Fire,
         /// Leaves the armed state without a pulse.
         0x0B Disarm,
         /// Writes the settings to the board's memory, whole or not at all.
         0x0F SaveSettings,
-        /// Done, or begun: what was asked for is accepted.
+        /// Done, or begun: the request is accepted.
         0x83 Accepted,
     }
     with_body {
@@ -92,7 +92,7 @@ messages! {
         /// Moves both axes.
         0x08 Move(Move),
         /// Makes ready for a trigger train.
-        0x09 Arm(Arm),
+        0x09 RequestTrigger(TriggerRequest),
         /// Asks for the [`Latch`] of a pulse of the last train.
         0x0C ReadLatch(u8),
         /// Asks for a setting.
@@ -107,10 +107,10 @@ messages! {
         /// How it is.
         0x82 Status(Status),
         /// Not accepted, and why. Nothing has changed.
-        0x84 Refused(Refusal),
+        0x84 Refused(RequestRefusal),
         /// The value of a setting.
         0x85 SettingIs(Setting),
-        /// What was latched at a pulse.
+        /// The latch of a pulse.
         0x86 LatchIs(Latch),
         /// An entry of the log.
         0x87 LogIs(LogEntry),
@@ -159,7 +159,7 @@ pub struct Hello {
     pub session: u32,
 }
 
-/// Who the controller is. Frozen.
+/// Identity of a controller. Frozen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// Oldest protocol version it understands.
@@ -170,7 +170,7 @@ pub struct Identity {
     pub schema_key: u32,
     /// Firmware version: major, minor, patch.
     pub firmware: [u8; 3],
-    /// State of the sources it was built from, such as `a1b2c3d4` or `a1b2c3d4+`.
+    /// ControllerState of the sources it was built from, such as `a1b2c3d4` or `a1b2c3d4+`.
     pub git: String<16>,
     /// Name of the board.
     pub board: String<16>,
@@ -191,9 +191,9 @@ pub enum ResetReason {
     PowerOn,
     /// The supply sagged.
     BrownOut,
-    /// The watchdog bit.
+    /// The watchdog expired.
     Watchdog,
-    /// The software asked for it, a panic included.
+    /// By the software, a panic included.
     Software,
     /// The reset pin.
     Pin,
@@ -210,30 +210,30 @@ pub struct Move {
 
 /// Which end of the trigger wire a controller is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Trigger {
+pub enum TriggerRole {
     /// It gives the pulses.
     Source,
-    /// It latches when the other controller gives one.
+    /// It latches its encoders when the other controller gives one.
     Follower,
 }
 
 /// A train of trigger pulses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Arm {
+pub struct TriggerRequest {
     /// Which end of the wire.
-    pub trigger: Trigger,
+    pub trigger: TriggerRole,
     /// Length of each pulse, µs: the exposure times.
     pub exposures_us: Vec<u32, MAX_PULSES>,
     /// Pause between pulses, µs.
     pub gap_us: u32,
 }
 
-/// What was latched at the rising edge of a pulse.
+/// What the encoders read at the rising edge of a pulse.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Latch {
     /// Number of the event, for counting losses; 0 in an answer.
     pub seq: u32,
-    /// The request that armed the train.
+    /// The trigger request of the train.
     pub request: u16,
     /// Which pulse of the train.
     pub pulse: u8,
@@ -268,7 +268,7 @@ pub struct Setting {
 /// What a controller is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum State {
+pub enum ControllerState {
     /// Starting; the first readings are not in yet.
     Boot,
     /// It does not know where it is.
@@ -279,22 +279,22 @@ pub enum State {
     Idle,
     /// Under way.
     Moving,
-    /// Arrived; waiting for the encoder to stay within the deadband.
+    /// Arrived; waiting for the encoder to stay within the in-position window.
     Settling,
     /// Ready to give or to follow trigger pulses.
     Armed,
-    /// Latched until cleared.
+    /// A latched fault, until it is cleared.
     Fault(FaultCode),
-    /// Stopped at once and latched until cleared.
+    /// Stopped at once, until it is cleared.
     EStop,
 }
 
 /// One axis as it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisStatus {
-    /// Where the steps say it is, µdeg.
+    /// Where the steps have brought it, µdeg.
     pub commanded_udeg: i32,
-    /// Where the encoder says it is, µdeg.
+    /// The encoder's reading, µdeg.
     pub encoder_udeg: i32,
     /// Largest |commanded − encoder| of the last move, µdeg.
     pub following_udeg: i32,
@@ -310,25 +310,25 @@ pub struct Status {
     /// Now.
     pub time_us: u64,
     /// What it is doing.
-    pub state: State,
+    pub state: ControllerState,
     /// Whether positions mean anything.
     pub homed: bool,
     /// θ and φ.
     pub axes: [AxisStatus; 2],
     /// The last request that ended, and how: the same as its event, which may have been lost.
-    pub last: Option<(u16, Outcome)>,
+    pub last: Option<(u16, RequestOutcome)>,
     /// Frames understood since the start.
-    pub frames_good: u32,
+    pub packets_good: u32,
     /// Frames thrown away since the start.
-    pub frames_bad: u32,
+    pub packets_bad: u32,
     /// Checksum of the settings in use.
     pub config_crc: u32,
 }
 
 /// How something accepted has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Outcome {
-    /// As asked.
+pub enum RequestOutcome {
+    /// As requested.
     Done,
     /// `Stop` or `Disarm` came first.
     Stopped,
@@ -346,7 +346,7 @@ pub struct Completed {
     /// The request that began it.
     pub request: u16,
     /// How.
-    pub outcome: Outcome,
+    pub outcome: RequestOutcome,
     /// Where the encoders were.
     pub encoder_udeg: [i32; 2],
     /// Corrections it took.
@@ -372,10 +372,10 @@ pub struct Telemetry {
     /// When.
     pub time_us: u64,
     /// What it is doing.
-    pub state: State,
-    /// Where the steps say it is, µdeg.
+    pub state: ControllerState,
+    /// Where the steps have brought it, µdeg.
     pub commanded_udeg: [i32; 2],
-    /// Where the encoders say it is, µdeg.
+    /// The encoders' readings, µdeg.
     pub encoder_udeg: [i32; 2],
 }
 
@@ -392,15 +392,15 @@ pub struct LogEntry {
 
 /// Why a request was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refusal {
-    /// The frame is of a protocol version that the controller does not speak.
+pub enum RequestRefusal {
+    /// The packet is of a protocol version that the controller does not speak.
     Version,
     /// No session is open: say `Hello` first. After this a host knows that the controller restarted.
     NoSession,
     /// The kind or its body is not understood.
     NotUnderstood,
     /// Not in this state.
-    State(State),
+    State(ControllerState),
     /// Home first.
     NotHomed,
     /// A target beyond a soft limit.
@@ -417,35 +417,37 @@ pub enum Refusal {
     NoSuchPulse,
 }
 
-impl core::fmt::Display for Refusal {
+impl core::fmt::Display for RequestRefusal {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Refusal::Version => f.write_str(
+            RequestRefusal::Version => f.write_str(
                 "host and firmware speak different protocol versions; update the older one",
             ),
-            Refusal::NoSession => {
+            RequestRefusal::NoSession => {
                 f.write_str("the controller has restarted; identify and home it again")
             }
-            Refusal::NotUnderstood => {
+            RequestRefusal::NotUnderstood => {
                 f.write_str("the controller does not know this command; update its firmware")
             }
-            Refusal::State(State::Fault(code)) => write!(f, "not while latched in {code}"),
-            Refusal::State(state) => write!(f, "not while {state:?}; stop first"),
-            Refusal::NotHomed => f.write_str("the arm does not know where it is; home it"),
-            Refusal::TargetBeyondLimit(axis) => {
+            RequestRefusal::State(ControllerState::Fault(code)) => {
+                write!(f, "not with a latched fault: {code}")
+            }
+            RequestRefusal::State(state) => write!(f, "not while {state:?}; stop first"),
+            RequestRefusal::NotHomed => f.write_str("the arm does not know where it is; home it"),
+            RequestRefusal::TargetBeyondLimit(axis) => {
                 write!(f, "the target of {axis:?} is beyond its soft limit")
             }
-            Refusal::StartBeyondLimit(axis) => {
+            RequestRefusal::StartBeyondLimit(axis) => {
                 write!(f, "{axis:?} stands beyond its soft limit; home the arm")
             }
-            Refusal::OutsideWindow(axis, error) => write!(
+            RequestRefusal::OutsideWindow(axis, error) => write!(
                 f,
                 "{axis:?} is {:.4}° off its target, outside the trigger window",
                 f64::from(*error) * 1e-6
             ),
-            Refusal::Value => f.write_str("no such setting, or its value is out of range"),
-            Refusal::CauseRemains(code) => write!(f, "the cause is still there: {code}"),
-            Refusal::NoSuchPulse => f.write_str("no such pulse was latched"),
+            RequestRefusal::Value => f.write_str("no such setting, or its value is out of range"),
+            RequestRefusal::CauseRemains(code) => write!(f, "the cause is still there: {code}"),
+            RequestRefusal::NoSuchPulse => f.write_str("no such pulse was captured"),
         }
     }
 }

@@ -4,8 +4,8 @@
 //! 144,000 steps a turn, 0.0025° a step) with an 18-bit absolute ring encoder on the output shaft
 //! (0.00137° a count). 15°/s is 225 rpm of the motor, and 90°/s² on an arm of 10 kg·m² needs 15.7 N·m
 //! at the shaft, 0.35 N·m at the motor through a worm of 50 % efficiency: a third of what a common
-//! 1.2 N·m NEMA 23 motor holds, so that the arm and not the motor limits the ramp. Acceleration and rise
-//! are those with the shortest settled moves over arms that swing at 6 Hz to 16 Hz (`gonia chart
+//! 1.2 N·m NEMA 23 motor holds, so that the arm and not the motor limits the ramp. Acceleration and jerk
+//! time are those with the shortest settled moves over arms that swing at 6 Hz to 16 Hz (`gonia chart
 //! --motion`).
 
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub const N_SETTINGS: usize = 30;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
-    /// Elevation, from the sample's normal.
+    /// Polar angle, from the sample's normal.
     Theta,
     /// Azimuth, anticlockwise from the sample's x axis.
     Phi,
@@ -49,7 +49,7 @@ pub enum Key {
     SoftMax = 4,
     /// Angle at which the home switch closes, coming from above, µdeg.
     HomeAngle = 5,
-    /// How far switch and encoder may disagree, µdeg: what a good switch repeats to. Where it is wider
+    /// How far switch and encoder may differ, µdeg: what a good switch repeats to. Where it is wider
     /// than the pointing limit, an encoder that has shifted is taken for right.
     HomeTolerance = 6,
     /// Highest speed, µdeg/s.
@@ -65,12 +65,12 @@ pub enum Key {
     /// Every target is approached from below, over at least this way, µdeg.
     BacklashTakeup = 12,
     /// Largest error at which a target counts as reached, µdeg.
-    Deadband = 13,
-    /// How long the encoder must stay within the deadband, µs.
-    SettleWindow = 14,
+    InPositionWindow = 13,
+    /// How long the encoder must stay within the in-position window, µs.
+    SettlingTime = 14,
     /// How long ringing may last before a correction is made, µs. The correction is the mean over
     /// the second half, which must be at least a period of the ringing.
-    SettlePatience = 15,
+    SettlingTimeout = 15,
     /// Corrections allowed for one target.
     MaxCorrections = 16,
     /// Largest difference of steps and encoder while moving, µdeg.
@@ -78,13 +78,14 @@ pub enum Key {
     /// Largest error at which a trigger pulse is given, µdeg. Well below the pointing limit: an arm that
     /// has arrived first may slip while it waits for the other one.
     TriggerWindow = 18,
-    /// The host must be heard this often while moving or armed, µs. Of the node: both axes share it.
-    Lease = 19,
+    /// While moving or armed, a packet of the host must arrive this often, µs. Of the node: both axes share
+    /// it.
+    HostWatchdog = 19,
     /// Time between telemetry while moving, µs; 0 for none. Of the node: both axes share it.
     Telemetry = 20,
-    /// How far steps and encoder, both counted from home, may disagree at rest, µdeg. More means that
-    /// one of both is wrong, and only the home switch can tell which. Calibrating makes it narrower.
-    StepsDisagree = 21,
+    /// How far steps and encoder, both counted from home, may differ at rest, µdeg. More means that one
+    /// of both is wrong, and only the home switch shows which. Calibrating makes it narrower.
+    StepLossLimit = 21,
     /// Error map of the encoder (see `gonia_firmware::error_map`): cosine, once a turn, µdeg.
     EncoderCos1 = 22,
     /// Sine, once a turn, µdeg.
@@ -93,9 +94,9 @@ pub enum Key {
     EncoderCos2 = 24,
     /// Sine, twice a turn, µdeg.
     EncoderSin2 = 25,
-    /// How long acceleration takes to build up and to die down, µs: jerk is acceleration / rise. 0 for a
-    /// trapezoid of speed. Near the period of the arm's swing it keeps the arm from swinging.
-    AccelerationRise = 26,
+    /// How long acceleration takes to build up and to die down, µs: jerk is acceleration / jerk time. 0
+    /// for a trapezoid of speed. Near the period of the arm's swing it keeps the arm from swinging.
+    JerkTime = 26,
     /// The worm's turn at the shaft, µdeg: the period of the gear's error.
     WormTurn = 27,
     /// Error of the gear: how far the shaft is ahead of the steps, cosine, once a turn of the worm, µdeg.
@@ -216,17 +217,23 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         (0, 5 * DEG),
         [100_000; 2],
     ),
-    m(Key::Deadband, "deadband", "µdeg", (500, 30_000), [6000; 2]),
     m(
-        Key::SettleWindow,
-        "settle_window",
+        Key::InPositionWindow,
+        "in_position_window",
+        "µdeg",
+        (500, 30_000),
+        [6000; 2],
+    ),
+    m(
+        Key::SettlingTime,
+        "settling_time",
         "µs",
         (4000, 10_000_000),
         [120_000; 2],
     ),
     m(
-        Key::SettlePatience,
-        "settle_patience",
+        Key::SettlingTimeout,
+        "settling_timeout",
         "µs",
         (20_000, 10_000_000),
         [240_000; 2],
@@ -247,8 +254,8 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         [12_000; 2],
     ),
     m(
-        Key::Lease,
-        "lease",
+        Key::HostWatchdog,
+        "host_watchdog",
         "µs",
         (100_000, 60_000_000),
         [2_000_000; 2],
@@ -261,8 +268,8 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         [500_000; 2],
     ),
     m(
-        Key::StepsDisagree,
-        "steps_disagree",
+        Key::StepLossLimit,
+        "step_loss_limit",
         "µdeg",
         (5000, 10 * DEG),
         [20_000; 2],
@@ -272,8 +279,8 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     map(Key::EncoderCos2, "encoder_cos2"),
     map(Key::EncoderSin2, "encoder_sin2"),
     m(
-        Key::AccelerationRise,
-        "acceleration_rise",
+        Key::JerkTime,
+        "jerk_time",
         "µs",
         (0, 1_000_000),
         [125_000; 2],
@@ -340,7 +347,7 @@ impl Key {
 
     /// Whether both axes of a node share one value.
     pub fn is_of_the_node(self) -> bool {
-        matches!(self, Key::Lease | Key::Telemetry)
+        matches!(self, Key::HostWatchdog | Key::Telemetry)
     }
 
     /// Its value on a new board.

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::frame::{Decoder, encode};
 use gonia_protocol::message::*;
+use gonia_protocol::packet::{Decoder, encode};
 use gonia_protocol::settings::{Axis, MEANINGS};
 use gonia_protocol::{NODE_LIGHT, SCHEMA_KEY, crc32c};
 
@@ -21,12 +21,12 @@ fn status() -> Status {
     };
     Status {
         time_us: 7_654_321,
-        state: State::Fault(FaultCode::LEASE_EXPIRED),
+        state: ControllerState::Fault(FaultCode::HOST_WATCHDOG),
         homed: true,
         axes: [axis(1), axis(-2)],
-        last: Some((REQUEST, Outcome::Failed(FaultCode::LEASE_EXPIRED))),
-        frames_good: 1000,
-        frames_bad: 2,
+        last: Some((REQUEST, RequestOutcome::Failed(FaultCode::HOST_WATCHDOG))),
+        packets_good: 1000,
+        packets_bad: 2,
         config_crc: 0xDEAD_BEEF,
     }
 }
@@ -42,7 +42,7 @@ fn latch(seq: u32) -> Latch {
     }
 }
 
-/// Every message once, with its frame in hexadecimal.
+/// Every message once, with its packet in hexadecimal. A table, so longer than a function should be.
 fn golden() -> Vec<(Message, &'static str)> {
     let setting = Setting {
         axis: Axis::Phi,
@@ -82,8 +82,8 @@ fn golden() -> Vec<(Message, &'static str)> {
             "0f010801020180a3c347018d0c8abe00",
         ),
         (
-            Message::Arm(Arm {
-                trigger: Trigger::Follower,
+            Message::RequestTrigger(TriggerRequest {
+                trigger: TriggerRole::Follower,
                 exposures_us: [1000, 16_000].into_iter().collect(),
                 gap_us: 500,
             }),
@@ -115,7 +115,7 @@ fn golden() -> Vec<(Message, &'static str)> {
         ),
         (Message::Accepted, "0a01830102010c788e3d00"),
         (
-            Message::Refused(Refusal::OutsideWindow(Axis::Phi, -31_000)),
+            Message::Refused(RequestRefusal::OutsideWindow(Axis::Phi, -31_000)),
             "0f01840102010701afe403683c525300",
         ),
         (
@@ -138,7 +138,7 @@ fn golden() -> Vec<(Message, &'static str)> {
             Message::Completed(Completed {
                 seq: 300,
                 request: REQUEST,
-                outcome: Outcome::Done,
+                outcome: RequestOutcome::Done,
                 encoder_udeg: [1, -1],
                 corrections: [0, 2],
             }),
@@ -156,7 +156,7 @@ fn golden() -> Vec<(Message, &'static str)> {
             Message::Telemetry(Telemetry {
                 seq: 302,
                 time_us: 5,
-                state: State::Moving,
+                state: ControllerState::Moving,
                 commanded_udeg: [2, -2],
                 encoder_udeg: [3, -3],
             }),
@@ -176,13 +176,13 @@ fn hex(bytes: &[u8]) -> String {
 #[test]
 fn every_message_has_its_golden_bytes() {
     for (message, expected) in golden() {
-        let frame = encode(NODE_LIGHT, REQUEST, &message).unwrap();
-        assert_eq!(hex(&frame), expected, "{message:?}");
+        let packet = encode(NODE_LIGHT, REQUEST, &message).unwrap();
+        assert_eq!(hex(&packet), expected, "{message:?}");
     }
 }
 
 #[test]
-fn every_golden_frame_is_read_back() {
+fn every_golden_packet_is_read_back() {
     for (message, expected) in golden() {
         let mut decoder = Decoder::new();
         let bytes = (0..expected.len())
@@ -199,7 +199,7 @@ fn every_golden_frame_is_read_back() {
 fn every_kind_stands_in_the_golden_list() {
     let listed: Vec<u8> = golden().iter().map(|(message, _)| message.kind()).collect();
     for kind in 0..=255u8 {
-        // A frame of a known kind with an impossible body is malformed, of an unknown kind unknown.
+        // A packet of a known kind with an impossible body is malformed, of an unknown kind unknown.
         let mut content = vec![1, kind, NODE_LIGHT, 1, 0];
         content.extend([0xFF; 40]);
         content.extend(crc32c(&content).to_le_bytes());
@@ -250,20 +250,20 @@ fn no_setting_has_ever_changed_its_number_or_its_unit() {
         "10 home_slow_speed µdeg/s",
         "11 home_backoff µdeg",
         "12 backlash_takeup µdeg",
-        "13 deadband µdeg",
-        "14 settle_window µs",
-        "15 settle_patience µs",
+        "13 in_position_window µdeg",
+        "14 settling_time µs",
+        "15 settling_timeout µs",
         "16 max_corrections",
         "17 following_limit µdeg",
         "18 trigger_window µdeg",
-        "19 lease µs",
+        "19 host_watchdog µs",
         "20 telemetry µs",
-        "21 steps_disagree µdeg",
+        "21 step_loss_limit µdeg",
         "22 encoder_cos1 µdeg",
         "23 encoder_sin1 µdeg",
         "24 encoder_cos2 µdeg",
         "25 encoder_sin2 µdeg",
-        "26 acceleration_rise µs",
+        "26 jerk_time µs",
         "27 worm_turn µdeg",
         "28 gear_cos µdeg",
         "29 gear_sin µdeg",

@@ -1,10 +1,10 @@
 //! Whatever comes in on the wire: no panic, and nothing accepted whose checksum is wrong.
 
-use gonia_protocol::frame::{Decoder, encode};
 use gonia_protocol::message::{Message, Move};
+use gonia_protocol::packet::{Decoder, encode};
 use proptest::prelude::*;
 
-/// Whether a block between two zeros is a frame, by a decoder that shares no code with the crate.
+/// Whether a block between two zeros is a packet, by a decoder that shares no code with the crate.
 fn is_valid_block(block: &[u8]) -> bool {
     let mut content = Vec::new();
     let mut at = 0;
@@ -53,20 +53,20 @@ proptest! {
     }
 
     #[test]
-    fn a_bent_frame_is_dropped_and_the_next_one_found(
+    fn a_bent_packet_is_dropped_and_the_next_one_found(
         target in any::<[i32; 2]>(), request in any::<u16>(), at in 0usize..64, to in any::<u8>()
     ) {
         let message = Message::Move(Move { target_udeg: target });
-        let frame = encode(1, request, &message).unwrap();
-        prop_assert!(is_valid_block(&frame[..frame.len() - 1]));
-        let mut bent = frame.clone();
+        let packet = encode(1, request, &message).unwrap();
+        prop_assert!(is_valid_block(&packet[..packet.len() - 1]));
+        let mut bent = packet.clone();
         let at = at % bent.len();
         bent[at] = to;
         let mut decoder = Decoder::new();
-        // The zero ends whatever the bent frame left open.
-        let stream: Vec<u8> = bent.iter().copied().chain([0]).chain(frame.iter().copied()).collect();
+        // The zero ends whatever the bent packet left open.
+        let stream: Vec<u8> = bent.iter().copied().chain([0]).chain(packet.iter().copied()).collect();
         let got: Vec<_> = stream.into_iter().filter_map(|b| decoder.push(b)).collect();
-        let expected = if bent == frame { 2 } else { 1 };
+        let expected = if bent == packet { 2 } else { 1 };
         prop_assert_eq!(got.len(), expected);
         let last = got.last().unwrap();
         prop_assert_eq!(last.header.request, request);

@@ -2,7 +2,7 @@
 
 use gonia_protocol::settings::Axis;
 
-/// Everything that goes wrong in a session. The default is a good day.
+/// Everything that goes wrong in a session. The default is nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultPlan {
     /// Faults of both wires, all the time.
@@ -89,11 +89,11 @@ pub enum Fault {
         /// By how much.
         udeg: f64,
     },
-    /// The home switch says the same whatever happens; `None` lets it go again.
+    /// The home switch's reading stays the same whatever happens; `None` ends that.
     SwitchStuck {
         /// Of which axis.
         axis: Axis,
-        /// What it says.
+        /// The reading.
         reading: Option<bool>,
     },
     /// Readings of the encoder scatter, by so much (standard deviation).

@@ -4,14 +4,15 @@
 //! |---|---|
 //! | [`plant`] | motor, gear, shaft, encoder and switch of one axis (`no_std`) |
 //! | [`swing`] | how an arm swings on its gear (`no_std`) |
-//! | [`bench`](mod@bench) | two such axes behind the firmware's hardware trait (`no_std`) |
-//! | [`fault`], [`random_faults`] | what may go wrong, as data; whole bad days by a seed |
+//! | [`arm`] | the arm: two such axes behind the firmware's hardware trait (`no_std`) |
+//! | [`fault`], [`random_faults`] | what may go wrong, as data; random fault plans by a seed |
 //! | [`wire`] | bytes under way between host and controller |
+//! | [`record`] | what happened and when: pulses, stops |
 //! | [`rig`] | two real controllers on their plants, in virtual time |
 //! | [`scene`] | what the camera sees |
 #![cfg_attr(not(feature = "std"), no_std)]
 
-pub mod bench;
+pub mod arm;
 pub mod plant;
 pub mod swing;
 
@@ -22,6 +23,8 @@ pub use gonia_firmware::profile;
 pub mod fault;
 #[cfg(feature = "std")]
 pub mod random_faults;
+#[cfg(feature = "std")]
+pub mod record;
 #[cfg(feature = "std")]
 pub mod rig;
 #[cfg(feature = "std")]

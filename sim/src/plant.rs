@@ -1,7 +1,7 @@
 //! One axis as a machine: stepper, worm gear, shaft, ring encoder, home switch.
 //!
 //! The motor is moved by events (a step at a time); everything else is a function of time, worked
-//! out when somebody looks. So an axis at rest costs nothing.
+//! out when it is read. So an axis at rest costs nothing.
 //!
 //! Effects and where they sit:
 //! step → *lost magnetic cycles* → motor → *gear error, backlash* → shaft → *ringing* → true angle
@@ -85,7 +85,7 @@ impl PlantConfig {
     }
 
     /// The same without what comes by chance or dies down with time: where it stands follows from its
-    /// steps alone, whenever somebody looks.
+    /// steps alone, whenever it is read.
     pub fn quiet(self) -> Self {
         Self {
             ring_hz: 0.0,
@@ -177,7 +177,7 @@ impl AxisPlant {
         self.output_udeg + self.slipped_udeg + gear + self.swing.udeg(now_us)
     }
 
-    /// What the encoder says, in counts of one turn; `None` when it does not answer.
+    /// The encoder's reading, in counts of one turn; `None` when it does not answer.
     pub fn encoder_counts(&mut self, now_us: u64) -> Option<u32> {
         if now_us < self.encoder_lost_until_us {
             return None;
@@ -195,7 +195,7 @@ impl AxisPlant {
         Some((counts as i64).rem_euclid(i64::from(config.encoder_counts)) as u32)
     }
 
-    /// What the home switch says.
+    /// The home switch's reading.
     pub fn switch_closed(&mut self, now_us: u64) -> bool {
         if let Some(stuck) = self.switch_stuck {
             return stuck;

@@ -1,4 +1,4 @@
-//! Days on which many things go wrong, by a seed.
+//! Random fault plans, by a seed.
 
 use gonia_protocol::settings::Axis;
 use rand_core::{Rng, SeedableRng};
@@ -6,22 +6,22 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan, WireFaults};
 
-/// How bad a day.
+/// How many faults, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weather {
+pub struct FaultMix {
     /// Faults happen from here on, µs.
     pub from_us: u64,
     /// And until here, µs.
     pub until_us: u64,
-    /// How many that a session can get over.
-    pub passing: u32,
-    /// How many that it cannot: the interlock, an encoder that stays shifted, a jammed switch.
-    pub lasting: u32,
+    /// How many that a session recovers from automatically.
+    pub recoverable: u32,
+    /// How many that it does not recover from: the interlock, an encoder that stays shifted, a jammed switch.
+    pub persistent: u32,
 }
 
 /// Faults of every kind, on both arms and all axes, and a wire that bends up to one byte in a
-/// thousand. The same seed and weather give the same plan.
-pub fn random_faults(seed: u64, weather: Weather) -> FaultPlan {
+/// thousand. The same seed and mix give the same plan.
+pub fn random_faults(seed: u64, mix: FaultMix) -> FaultPlan {
     let mut dice = Dice(Xoshiro256PlusPlus::seed_from_u64(seed));
     let mut rate = || dice.between(0.0, 2.5e-4);
     let wire = WireFaults {
@@ -32,14 +32,14 @@ pub fn random_faults(seed: u64, weather: Weather) -> FaultPlan {
         delay_us: 50_000,
     };
     let mut events = Vec::new();
-    for i in 0..weather.passing + weather.lasting {
-        let fault = if i < weather.passing {
-            dice.passing()
+    for i in 0..mix.recoverable + mix.persistent {
+        let fault = if i < mix.recoverable {
+            dice.recoverable()
         } else {
-            dice.lasting()
+            dice.persistent()
         };
         events.push(FaultEvent {
-            at_us: dice.between(weather.from_us as f64, weather.until_us as f64) as u64,
+            at_us: dice.between(mix.from_us as f64, mix.until_us as f64) as u64,
             arm: Arm::BOTH[dice.below(2) as usize],
             fault,
         });
@@ -50,7 +50,7 @@ pub fn random_faults(seed: u64, weather: Weather) -> FaultPlan {
 struct Dice(Xoshiro256PlusPlus);
 
 impl Dice {
-    fn passing(&mut self) -> Fault {
+    fn recoverable(&mut self) -> Fault {
         let axis = self.axis();
         match self.below(10) {
             0 => Fault::LoseCycles {
@@ -91,7 +91,7 @@ impl Dice {
         }
     }
 
-    fn lasting(&mut self) -> Fault {
+    fn persistent(&mut self) -> Fault {
         let axis = self.axis();
         match self.below(3) {
             0 => Fault::InterlockOpen { for_us: 1_000_000 },
@@ -134,15 +134,15 @@ mod tests {
 
     #[test]
     fn a_seed_is_a_day_and_its_faults_lie_within_it() {
-        let weather = Weather {
+        let mix = FaultMix {
             from_us: 1_000,
             until_us: 2_000,
-            passing: 200,
-            lasting: 3,
+            recoverable: 200,
+            persistent: 3,
         };
-        let plan = random_faults(4, weather);
-        assert_eq!(plan, random_faults(4, weather));
-        assert_ne!(plan, random_faults(5, weather));
+        let plan = random_faults(4, mix);
+        assert_eq!(plan, random_faults(4, mix));
+        assert_ne!(plan, random_faults(5, mix));
         assert_eq!(plan.events.len(), 203);
         let within = |e: &FaultEvent| (1_000..2_000).contains(&e.at_us);
         assert!(plan.events.iter().all(within));

@@ -4,53 +4,12 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use gonia_brdf::direction::{Direction, Pose};
-use gonia_protocol::message::State;
+use gonia_brdf::direction::Pose;
 
-use crate::bench::Bench;
-pub use crate::fault::Arm;
-use crate::fault::FaultPlan;
+use crate::arm::SimulatedArm;
+use crate::fault::{Arm, FaultPlan};
+use crate::record::{StopRecord, TriggerRecord};
 use crate::world::World;
-
-/// A trigger pulse, and where the shafts truly were at its rising edge. Only the simulated camera
-/// may look at this; the host sees encoders.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriggerRecord {
-    /// Counts pulses of both arms, from 0.
-    pub sequence: u32,
-    /// Virtual time, µs.
-    pub time_us: u64,
-    /// How long it was, µs; `None` while it lasts.
-    pub width_us: Option<u64>,
-    /// The arm that gave it.
-    pub source: Arm,
-    /// True θ and φ of the light arm, degrees.
-    pub light_deg: [f64; 2],
-    /// True θ and φ of the camera arm, degrees.
-    pub camera_deg: [f64; 2],
-}
-
-impl TriggerRecord {
-    /// The true pose.
-    pub fn pose(&self) -> Pose {
-        let direction = |[theta, phi]: [f64; 2]| Direction::from_deg(theta, phi);
-        Pose {
-            light: direction(self.light_deg),
-            view: direction(self.camera_deg),
-        }
-    }
-}
-
-/// An arm that has latched, or whose controller has restarted, has come to rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StopRecord {
-    /// Virtual time of its last step or of its latching, whichever came later, µs.
-    pub time_us: u64,
-    /// Which arm.
-    pub arm: Arm,
-    /// The state it is in; `Boot` after a restart.
-    pub state: State,
-}
 
 /// The simulated rig. Clones are the same rig.
 #[derive(Clone, Debug)]
@@ -61,13 +20,13 @@ pub struct SimRig {
 impl SimRig {
     /// A rig of default arms. The same seed and plan give the same bytes.
     pub fn new(seed: u64, faults: FaultPlan) -> Self {
-        let light = Bench::default_arm(seed.wrapping_mul(4).wrapping_add(1));
-        let camera = Bench::default_arm(seed.wrapping_mul(4).wrapping_add(2));
+        let light = SimulatedArm::default_arm(seed.wrapping_mul(4).wrapping_add(1));
+        let camera = SimulatedArm::default_arm(seed.wrapping_mul(4).wrapping_add(2));
         Self::with_arms(seed, faults, [light, camera])
     }
 
     /// A rig of other arms: light, camera.
-    pub fn with_arms(seed: u64, faults: FaultPlan, arms: [Bench; 2]) -> Self {
+    pub fn with_arms(seed: u64, faults: FaultPlan, arms: [SimulatedArm; 2]) -> Self {
         Self {
             world: Arc::new(Mutex::new(World::new(seed, faults, arms))),
         }
@@ -110,7 +69,7 @@ impl SimRig {
     pub fn true_deg(&self, arm: Arm) -> [f64; 2] {
         let mut world = lock(&self.world);
         let now_us = world.now_us();
-        world.bench(arm).true_deg(now_us)
+        world.hardware(arm).true_deg(now_us)
     }
 
     /// A hash of every byte that the controllers have sent: equal for equal runs.

@@ -4,22 +4,22 @@
 use std::collections::VecDeque;
 
 use gonia_brdf::direction::{Direction, angle_between};
-use gonia_firmware::controller::Controller;
-use gonia_firmware::node::{Node, identity};
+use gonia_firmware::controller::ArmController;
+use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::store::Stored;
-use gonia_protocol::message::{ResetReason, State};
+use gonia_protocol::message::{ControllerState, ResetReason};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
-use crate::bench::Bench;
+use crate::arm::SimulatedArm;
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
-use crate::rig::{StopRecord, TriggerRecord};
+use crate::record::{StopRecord, TriggerRecord};
 use crate::wire::Wire;
 
 #[derive(Debug)]
 struct ArmSim {
     address: u8,
-    node: Node,
-    bench: Bench,
+    node: ControllerNode,
+    hardware: SimulatedArm,
     to_device: Wire,
     to_host: Wire,
     boot_id: u32,
@@ -45,15 +45,15 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) fn new(seed: u64, mut plan: FaultPlan, benches: [Bench; 2]) -> Self {
+    pub(crate) fn new(seed: u64, mut plan: FaultPlan, arms: [SimulatedArm; 2]) -> Self {
         plan.events.sort_by_key(|event| event.at_us);
-        let [light, camera] = benches;
-        let arm = |address: u8, mut bench: Bench| {
+        let [light, camera] = arms;
+        let arm = |address: u8, mut hardware: SimulatedArm| {
             let wire_seed = seed.wrapping_add(u64::from(address) << 32);
             ArmSim {
                 address,
-                node: boot(address, 1, ResetReason::PowerOn, 0, bench.open_store()),
-                bench,
+                node: boot(address, 1, ResetReason::PowerOn, 0, hardware.open_store()),
+                hardware,
                 to_device: Wire::new(plan.wire, wire_seed),
                 to_host: Wire::new(plan.wire, wire_seed + 1),
                 boot_id: 1,
@@ -93,10 +93,10 @@ impl World {
     }
 
     /// An arm as it is now.
-    pub(crate) fn bench(&mut self, arm: Arm) -> &mut Bench {
-        let bench = &mut self.arms[arm as usize].bench;
-        bench.set_now(self.now_us);
-        bench
+    pub(crate) fn hardware(&mut self, arm: Arm) -> &mut SimulatedArm {
+        let hardware = &mut self.arms[arm as usize].hardware;
+        hardware.set_now(self.now_us);
+        hardware
     }
 
     pub(crate) fn send(&mut self, arm: Arm, bytes: &[u8]) {
@@ -147,36 +147,36 @@ impl World {
             return;
         }
         let wakes = arm.node.wake_us() <= now_us;
-        arm.bench.set_now(now_us);
+        arm.hardware.set_now(now_us);
         if wakes {
-            let other_holds = self.arms[1 - i].bench.holds_interlock_open();
+            let other_holds = self.arms[1 - i].hardware.holds_interlock_open();
             let closed =
                 !other_holds && now_us >= self.interlock_open_until_us && !self.arms_touch();
             let arm = &mut self.arms[i];
-            arm.bench.set_interlock_closed(closed);
-            arm.node.poll(now_us, &mut arm.bench);
+            arm.hardware.set_interlock_closed(closed);
+            arm.node.poll(now_us, &mut arm.hardware);
         }
         let arm = &mut self.arms[i];
         while let Some(byte) = arm.to_device.take(now_us) {
-            arm.node.receive(byte, now_us, &mut arm.bench);
-            if arm.bench.take_death() {
+            arm.node.receive(byte, now_us, &mut arm.hardware);
+            if arm.hardware.take_death() {
                 self.restart(i);
                 return;
             }
         }
         while arm.late_edges_us.front().is_some_and(|&at| at <= now_us) {
             arm.late_edges_us.pop_front();
-            arm.node.trigger_edge(now_us, &mut arm.bench);
+            arm.node.trigger_edge(now_us, &mut arm.hardware);
         }
-        let edges = arm.bench.take_rising_edges();
-        if arm.bench.take_fall() {
+        let edges = arm.hardware.take_rising_edges();
+        if arm.hardware.take_fall() {
             let source = Arm::BOTH[i];
             let ended = self.triggers.iter_mut().rev().find(|t| t.source == source);
             if let Some(trigger) = ended {
                 trigger.width_us = Some(now_us - trigger.time_us);
             }
         }
-        self.send_frames(i);
+        self.send_packets(i);
         for _ in 0..edges {
             self.trigger(i);
         }
@@ -189,20 +189,20 @@ impl World {
         }
         let now_us = self.now_us;
         let [light, view] = self.arms.each_mut().map(|arm| {
-            arm.bench.set_now(now_us);
-            let [theta, phi] = arm.bench.true_deg(now_us);
+            arm.hardware.set_now(now_us);
+            let [theta, phi] = arm.hardware.true_deg(now_us);
             Direction::from_deg(theta, phi).to_vec3()
         });
         angle_between(light, view).to_degrees() < self.bumper_deg
     }
 
-    fn send_frames(&mut self, i: usize) {
+    fn send_packets(&mut self, i: usize) {
         let arm = &mut self.arms[i];
-        while let Some(frame) = arm.node.take_frame() {
-            for &byte in &frame {
+        while let Some(packet) = arm.node.take_packet() {
+            for &byte in &packet {
                 self.trace = (self.trace ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
             }
-            arm.to_host.send(self.now_us, &frame);
+            arm.to_host.send(self.now_us, &packet);
         }
     }
 
@@ -210,15 +210,15 @@ impl World {
     fn trigger(&mut self, source: usize) {
         let now_us = self.now_us;
         for arm in &mut self.arms {
-            arm.bench.set_now(now_us);
+            arm.hardware.set_now(now_us);
         }
         let record = TriggerRecord {
             sequence: self.triggers.len() as u32,
             time_us: now_us,
             width_us: None,
             source: Arm::BOTH[source],
-            light_deg: self.arms[0].bench.true_deg(now_us),
-            camera_deg: self.arms[1].bench.true_deg(now_us),
+            light_deg: self.arms[0].hardware.true_deg(now_us),
+            camera_deg: self.arms[1].hardware.true_deg(now_us),
         };
         self.triggers.push(record);
         let follower = &mut self.arms[1 - source];
@@ -231,24 +231,24 @@ impl World {
             follower.late_edges_us.push_back(now_us + late_us);
             return;
         }
-        follower.node.trigger_edge(now_us, &mut follower.bench);
-        self.send_frames(1 - source);
+        follower.node.trigger_edge(now_us, &mut follower.hardware);
+        self.send_packets(1 - source);
     }
 
     fn strike(&mut self, event: FaultEvent) {
         let now_us = self.now_us;
         let i = event.arm as usize;
         let arm = &mut self.arms[i];
-        arm.bench.set_now(now_us);
+        arm.hardware.set_now(now_us);
         match event.fault {
-            Fault::LoseCycles { axis, cycles } => arm.bench.axis(axis).lose_cycles(cycles),
-            Fault::Stall { axis, for_us } => arm.bench.axis(axis).stall_until(now_us + for_us),
-            Fault::Slip { axis, udeg } => arm.bench.axis(axis).slip(udeg),
+            Fault::LoseCycles { axis, cycles } => arm.hardware.axis(axis).lose_cycles(cycles),
+            Fault::Stall { axis, for_us } => arm.hardware.axis(axis).stall_until(now_us + for_us),
+            Fault::Slip { axis, udeg } => arm.hardware.axis(axis).slip(udeg),
             Fault::EncoderLost { axis, for_us } => {
-                arm.bench.axis(axis).lose_encoder_until(now_us + for_us);
+                arm.hardware.axis(axis).lose_encoder_until(now_us + for_us);
             }
-            Fault::EncoderJump { axis, udeg } => arm.bench.axis(axis).shift_encoder(udeg),
-            Fault::SwitchStuck { axis, reading } => arm.bench.axis(axis).stick_switch(reading),
+            Fault::EncoderJump { axis, udeg } => arm.hardware.axis(axis).shift_encoder(udeg),
+            Fault::SwitchStuck { axis, reading } => arm.hardware.axis(axis).stick_switch(reading),
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
             Fault::Bumper { deg } => self.bumper_deg = deg,
             Fault::Unplugged { for_us } => {
@@ -258,13 +258,13 @@ impl World {
             Fault::BrownOut => self.restart(i),
             Fault::TriggerLost { pulses } => arm.lost_triggers += pulses,
             Fault::TriggerLate { by_us } => arm.trigger_late_us = by_us,
-            Fault::TornSave { after_bytes } => arm.bench.die_while_saving(after_bytes),
+            Fault::TornSave { after_bytes } => arm.hardware.die_while_saving(after_bytes),
             Fault::EncoderNoise { axis, udeg, for_us } => {
-                let plant = arm.bench.axis(axis);
+                let plant = arm.hardware.axis(axis);
                 plant.disturb_encoder_until(now_us + for_us, udeg);
             }
             Fault::SwitchBounces { axis, bounce_us } => {
-                arm.bench.axis(axis).wear_switch(bounce_us);
+                arm.hardware.axis(axis).wear_switch(bounce_us);
             }
         }
     }
@@ -274,10 +274,10 @@ impl World {
         let now_us = self.now_us;
         let arm = &mut self.arms[i];
         arm.boot_id += 1;
-        arm.bench.reset_outputs();
+        arm.hardware.reset_outputs();
         arm.to_device.clear();
         arm.to_host.clear();
-        let stored = arm.bench.open_store();
+        let stored = arm.hardware.open_store();
         arm.node = boot(
             arm.address,
             arm.boot_id,
@@ -288,7 +288,7 @@ impl World {
         self.stops.push(StopRecord {
             time_us: now_us,
             arm: Arm::BOTH[i],
-            state: State::Boot,
+            state: ControllerState::Boot,
         });
     }
 
@@ -297,7 +297,8 @@ impl World {
         let arm = &mut self.arms[i];
         let controller = arm.node.controller();
         let state = controller.state();
-        let is_safe = matches!(state, State::Fault(_) | State::EStop) && !controller.is_moving();
+        let is_safe = matches!(state, ControllerState::Fault(_) | ControllerState::EStop)
+            && !controller.is_moving();
         if is_safe && !arm.is_safe {
             self.stops.push(StopRecord {
                 time_us: self.now_us,
@@ -323,11 +324,11 @@ fn boot(
     reset: ResetReason,
     now_us: u64,
     stored: Option<Stored>,
-) -> Node {
+) -> ControllerNode {
     let identity = identity("sim", boot_id, reset, "");
-    Node::new(
+    ControllerNode::new(
         address,
         identity,
-        Controller::new(now_us, stored.as_deref()),
+        ArmController::new(now_us, stored.as_deref()),
     )
 }

@@ -7,7 +7,7 @@ use gonia_acquire::capture::Arms;
 use gonia_acquire::link::{Controller, calibrate_axis};
 use gonia_protocol::settings::{Axis, Key, MEANINGS};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::plant::PlantConfig;
 use gonia_sim::rig::SimRig;
@@ -43,7 +43,7 @@ pub fn rig(seed: u64, faults: FaultPlan) -> (SimRig, Arms) {
     (rig, arms)
 }
 
-fn arms(seed: u64) -> [Bench; 2] {
+fn arms(seed: u64) -> [SimulatedArm; 2] {
     [eccentric_arm(2 * seed), eccentric_arm(2 * seed + 1)]
 }
 
@@ -73,7 +73,7 @@ fn calibrate_both(seed: u64) -> Changed {
 }
 
 /// An arm whose two rings sit off their axes, each its own way.
-fn eccentric_arm(seed: u64) -> Bench {
+fn eccentric_arm(seed: u64) -> SimulatedArm {
     let axis = |axis: Axis, start_udeg, turns: f64| {
         let home_udeg = f64::from(Key::HomeAngle.default_of(axis));
         PlantConfig {
@@ -83,7 +83,7 @@ fn eccentric_arm(seed: u64) -> Bench {
         }
     };
     let theta = axis(Axis::Theta, 21.3e6, 0.618);
-    Bench::new([theta, axis(Axis::Phi, -12.8e6, 0.414)], seed)
+    SimulatedArm::new([theta, axis(Axis::Phi, -12.8e6, 0.414)], seed)
 }
 
 fn calibrate(rig: &SimRig, arm: Arm, controller: &mut Controller) {
@@ -105,6 +105,6 @@ fn calibrate(rig: &SimRig, arm: Arm, controller: &mut Controller) {
             gear.rms_before_deg > 0.0015 && gear.rms_after_deg < 0.0015,
             "{gear:?}"
         );
-        assert_eq!(found.steps_disagree_udeg, 10_000);
+        assert_eq!(found.step_loss_limit_udeg, 10_000);
     }
 }

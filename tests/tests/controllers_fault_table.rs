@@ -1,8 +1,8 @@
-//! The table of faults: each is let loose on a session of the real host and the real firmware core,
-//! what comes of it is compared with the row, and the rows are docs/src/reference/faults.md.
+//! The table of faults: each is injected into a session of the real host and the real firmware core, the
+//! outcome is compared with the row, and the rows stand between marks in the book's page of faults.
 //!
-//! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-tests --test controllers_fault_table` writes the file;
-//! without it the test fails when the file says something else.
+//! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-tests --test controllers_fault_table` writes them;
+//! without it the test fails when the page says something else.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -15,13 +15,15 @@ use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{Refusal, State};
+use gonia_protocol::message::{ControllerState, RequestRefusal};
 use gonia_protocol::settings::{Axis, Key};
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan, WireFaults};
 use gonia_sim::plant::PlantConfig;
 use gonia_sim::rig::SimRig;
 
+/// The book's page of faults.
+const PAGE: &str = "../docs/src/reference/faults.md";
 /// In the midst of a move of the session.
 const STRIKE_US: u64 = 62_345_678;
 const N_POSES: usize = 30;
@@ -39,8 +41,8 @@ enum Cause {
     Wire(WireFaults),
     /// θ of the light arm is built like this.
     Axis(fn(&mut PlantConfig)),
-    /// The same, and the person at the bench has done something about it.
-    Mended(fn(&mut PlantConfig), fn(&SimRig, &mut Controller)),
+    /// The same, after a person has adjusted it on the test bench.
+    Adjusted(fn(&mut PlantConfig), fn(&SimRig, &mut Controller)),
     /// The power goes while the host saves settings.
     TornSave,
     /// The host falls silent during a move.
@@ -57,7 +59,7 @@ enum Cause {
     CameraNotReady,
 }
 
-/// What comes of it.
+/// The outcome.
 #[derive(Debug, PartialEq)]
 enum End {
     /// Every pose kept; whether a shot was retaken, and an arm brought back.
@@ -79,6 +81,7 @@ struct Row {
     host: &'static str,
 }
 
+/// A table, so longer than a function should be.
 fn rows() -> Vec<Row> {
     let event = |fault, cause, does, codes, end, host| Row {
         fault,
@@ -101,7 +104,7 @@ fn rows() -> Vec<Row> {
         recovered: false,
     };
     const HOMES: &str = "clears the fault, homes, takes the pose again";
-    const DISAGREE: &[FaultCode] = &[FaultCode::STEPS_DISAGREE];
+    const DISAGREE: &[FaultCode] = &[FaultCode::STEP_LOSS];
     vec![
         event(
             "missed steps: 3 magnetic cycles, 0.24°",
@@ -109,7 +112,7 @@ fn rows() -> Vec<Row> {
                 axis: THETA,
                 cycles: 3,
             },
-            "corrects by the encoder; at rest steps and encoder disagree: latches",
+            "corrects by the encoder; at rest steps and encoder differ: latched fault",
             DISAGREE,
             over_it(),
             HOMES,
@@ -131,7 +134,7 @@ fn rows() -> Vec<Row> {
                 axis: THETA,
                 udeg: -150_000.0,
             },
-            "corrects by the encoder; at rest steps and encoder disagree: latches",
+            "corrects by the encoder; at rest steps and encoder differ: latched fault",
             DISAGREE,
             over_it(),
             HOMES,
@@ -139,14 +142,14 @@ fn rows() -> Vec<Row> {
         Row {
             fault: "backlash of 0.15°, backlash_takeup 0.1°",
             cause: Cause::Axis(|theta| theta.backlash_udeg = 150_000.0),
-            does: "corrects; latches where that does not suffice, or where steps and encoder disagree at rest",
-            codes: &[FaultCode::NOT_REACHED, FaultCode::STEPS_DISAGREE],
+            does: "corrects; latched fault where that does not suffice, or where steps and encoder differ at rest",
+            codes: &[FaultCode::NOT_REACHED, FaultCode::STEP_LOSS],
             end: End::Refused,
             host: "homes and tries again, then gives the pose up with its reason",
         },
         Row {
             fault: "backlash of 0.15°, backlash_takeup raised to 0.3°",
-            cause: Cause::Mended(
+            cause: Cause::Adjusted(
                 |theta| theta.backlash_udeg = 150_000.0,
                 |_, light| {
                     let set = light.set_setting(THETA, Key::BacklashTakeup, 300_000);
@@ -187,7 +190,7 @@ fn rows() -> Vec<Row> {
                 udeg: 20_000.0,
                 for_us: 60_000_000,
             },
-            "does not settle; latches when its corrections are used up; home is kept",
+            "does not settle; latched fault when its corrections are used up; home is kept",
             &[FaultCode::NOT_REACHED],
             End::Refused,
             "tries four times, gives the pose up with its reason, goes on",
@@ -209,22 +212,22 @@ fn rows() -> Vec<Row> {
                 axis: THETA,
                 udeg: 100_000.0,
             },
-            "moves after it; at rest steps and encoder disagree: latches; homing tells which is wrong",
-            &[FaultCode::STEPS_DISAGREE, FaultCode::HOME_MISMATCH],
+            "moves after it; at rest steps and encoder differ: latched fault; homing shows which is wrong",
+            &[FaultCode::STEP_LOSS, FaultCode::HOME_MISMATCH],
             End::Stopped("home switch and encoder disagree"),
             "tries to home, stops the session",
         ),
         Row {
             fault: "eccentricity of 0.05°, never calibrated",
             cause: Cause::Axis(eccentric),
-            does: "latches where steps and encoder disagree at rest",
+            does: "latched fault where steps and encoder differ at rest",
             codes: DISAGREE,
             end: End::Refused,
             host: "homes and tries again, then gives the pose up (`gonia device PORT identify` names the axis)",
         },
         Row {
             fault: "eccentricity of 0.05°, calibrated",
-            cause: Cause::Mended(eccentric, calibrate_theta),
+            cause: Cause::Adjusted(eccentric, calibrate_theta),
             does: "takes the error map off every reading",
             codes: &[],
             end: nothing(),
@@ -277,7 +280,7 @@ fn rows() -> Vec<Row> {
             does: "finds the old settings whole in the other sector",
             codes: &[],
             end: nothing(),
-            host: "hears of the restart, saves again",
+            host: "notices the restart, saves again",
         },
         event(
             "trigger missed by the other arm",
@@ -285,15 +288,15 @@ fn rows() -> Vec<Row> {
             "stays armed until disarmed",
             &[],
             retaken(),
-            "throws the frame away, takes the pose again",
+            "drops the frame, takes the pose again",
         ),
         event(
             "trigger 2 s late at the other arm",
             Fault::TriggerLate { by_us: 2_000_000 },
-            "ignores an edge that nobody armed it for",
+            "ignores an edge without a trigger request",
             &[],
             retaken(),
-            "throws the frame away, takes the pose again",
+            "drops the frame, takes the pose again",
         ),
         Row {
             fault: "camera not ready",
@@ -306,15 +309,15 @@ fn rows() -> Vec<Row> {
         Row {
             fault: "host gone in mid-move",
             cause: Cause::HostGone,
-            does: "slows down and stops when the lease (2 s) runs out; home is kept",
-            codes: &[FaultCode::LEASE_EXPIRED],
+            does: "slows down and stops when the host watchdog (2 s) expires; home is kept",
+            codes: &[FaultCode::HOST_WATCHDOG],
             end: End::RequestRefused,
             host: "–",
         },
         event(
             "cable out for 10 s",
             Fault::Unplugged { for_us: 10_000_000 },
-            "ends its move; were it still under way when the lease (2 s) runs out, it would stop and latch",
+            "ends its move; were it still under way when the host watchdog (2 s) expires, it would stop with a latched fault",
             &[],
             over_it(),
             "says hello until it is answered, takes the pose again",
@@ -336,23 +339,23 @@ fn rows() -> Vec<Row> {
         event(
             "interlock or emergency stop opens",
             Fault::InterlockOpen { for_us: 1_000_000 },
-            "both controllers stop at once and latch",
+            "both controllers stop at once with a latched fault",
             &[FaultCode::INTERLOCK_OPEN],
             End::Stopped("interlock"),
-            "stops the session: a person made it stop, a person lets it go on",
+            "stops the session, until a person lets it go on",
         ),
         Row {
-            fault: "arms told to collide, keep-out angle of 25° known to the host",
+            fault: "targets at which the arms collide, keep-out angle of 25° known to the host",
             cause: Cause::KeepOut,
-            does: "is not asked",
+            does: "gets no move",
             codes: &[],
             end: End::Stopped("arms would be"),
             host: "sends no move; stops the session and names the pose",
         },
         Row {
-            fault: "arms told to change places, keep-out angle of 25° known to the host",
+            fault: "targets for which the arms change places, keep-out angle of 25° known to the host",
             cause: Cause::KeepOutOnTheWay,
-            does: "is not asked: a bumper switch in the chain stays closed",
+            does: "gets no move that could collide: a bumper switch in the chain stays closed",
             codes: &[],
             end: nothing(),
             host: "sends one arm round the other",
@@ -360,13 +363,13 @@ fn rows() -> Vec<Row> {
         Row {
             fault: "arms about to touch on the way, bumper switch in the interlock chain",
             cause: Cause::Bumper,
-            does: "both controllers stop at once and latch; neither knows where the other's arm is",
+            does: "both controllers stop at once with a latched fault; neither knows where the other's arm is",
             codes: &[FaultCode::INTERLOCK_OPEN],
             end: End::Stopped("interlock"),
             host: "stops the session: a person moves the arms apart",
         },
         Row {
-            fault: "told to run into the desk or out of its limits",
+            fault: "a target in the desk or beyond the limits",
             cause: Cause::BeyondLimits,
             does: "refuses the move; no step is given",
             codes: &[],
@@ -382,7 +385,7 @@ fn eccentric(theta: &mut PlantConfig) {
     theta.eccentricity_phase_udeg = 0.0;
 }
 
-/// As at the bench: an autocollimator tells where the axis truly is.
+/// As on a test bench: an autocollimator measures where the axis truly is.
 fn calibrate_theta(rig: &SimRig, light: &mut Controller) {
     let stands: Vec<i32> = (0..10).map(|i| i * 9_700_000).collect();
     let mut autocollimator = |_: &mut Controller, _| Ok(rig.true_deg(Arm::Light)[0]);
@@ -390,7 +393,7 @@ fn calibrate_theta(rig: &SimRig, light: &mut Controller) {
     assert!(fit.encoder.rms_after_deg < 0.001, "{fit:?}");
 }
 
-// ---- what a row comes to ----
+// ---- the outcome of a row ----
 
 struct Seen {
     codes: Vec<FaultCode>,
@@ -420,13 +423,13 @@ fn poses_that_change_places() -> Vec<Pose> {
     (0..N_POSES).map(pose).collect()
 }
 
-fn light_arm(change: fn(&mut PlantConfig)) -> Bench {
+fn light_arm(change: fn(&mut PlantConfig)) -> SimulatedArm {
     let axis = |axis: Axis, start_udeg| {
         PlantConfig::worm_axis(f64::from(Key::HomeAngle.default_of(axis)), start_udeg)
     };
     let mut theta = axis(THETA, 21.3e6);
     change(&mut theta);
-    Bench::new([theta, axis(Axis::Phi, -12.8e6)], 21)
+    SimulatedArm::new([theta, axis(Axis::Phi, -12.8e6)], 21)
 }
 
 fn rig_for(cause: &Cause) -> (SimRig, u64) {
@@ -449,8 +452,8 @@ fn rig_for(cause: &Cause) -> (SimRig, u64) {
             };
             (SimRig::new(11, plan), 0)
         }
-        Cause::Axis(change) | Cause::Mended(change, _) => {
-            let arms = [light_arm(*change), Bench::default_arm(22)];
+        Cause::Axis(change) | Cause::Adjusted(change, _) => {
+            let arms = [light_arm(*change), SimulatedArm::default_arm(22)];
             (SimRig::with_arms(5, FaultPlan::default(), arms), 0)
         }
         Cause::Bumper => {
@@ -480,8 +483,8 @@ fn run(row: &Row) -> Seen {
     let mut codes: Vec<FaultCode> = Vec::new();
     for stop in &stops {
         let code = match stop.state {
-            State::Fault(code) => code,
-            State::EStop => FaultCode::INTERLOCK_OPEN,
+            ControllerState::Fault(code) => code,
+            ControllerState::EStop => FaultCode::INTERLOCK_OPEN,
             _ => continue,
         };
         if !codes.contains(&code) {
@@ -500,9 +503,9 @@ fn run(row: &Row) -> Seen {
 
 fn session(rig: &SimRig, cause: &Cause) -> End {
     let port = |arm| Box::new(rig.port(arm));
-    if let Cause::Mended(_, mend) = cause {
+    if let Cause::Adjusted(_, adjust) = cause {
         let mut light = Controller::connect(port(Arm::Light), NODE_LIGHT).unwrap();
-        mend(rig, &mut light);
+        adjust(rig, &mut light);
         light.rest(1_000).unwrap();
     }
     let mut arms = Arms::connect(port(Arm::Light), port(Arm::Camera)).unwrap();
@@ -567,7 +570,7 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
 }
 
 fn row_calibrates(cause: &Cause) -> bool {
-    matches!(cause, Cause::Mended(_, mend) if std::ptr::fn_addr_eq(*mend, calibrate_theta as fn(&SimRig, &mut Controller)))
+    matches!(cause, Cause::Adjusted(_, adjust) if std::ptr::fn_addr_eq(*adjust, calibrate_theta as fn(&SimRig, &mut Controller)))
 }
 
 fn homed(rig: &SimRig) -> Controller {
@@ -635,7 +638,7 @@ fn tear_a_save() -> End {
             .unwrap();
         match arm.save_settings() {
             Err(LinkError::Refused {
-                refusal: Refusal::NoSession,
+                refusal: RequestRefusal::NoSession,
                 ..
             }) => {}
             other => panic!("{other:?}"),
@@ -652,14 +655,10 @@ fn tear_a_save() -> End {
 
 // ---- the page ----
 
-const HEAD: &str = "\
-| fault | the controller | code | the host | the session | time to safe |
-|---|---|---|---|---|---|
-";
-
-/// The page with its two tables made anew.
-fn page_of(page: &str, rows: &[(Row, Seen)]) -> String {
-    let mut table = HEAD.to_owned();
+fn outcomes_of(rows: &[(Row, Seen)]) -> String {
+    let mut table = String::from(
+        "| fault | the controller | code | the host | the session | time to safe |\n|---|---|---|---|---|---|\n",
+    );
     for (row, seen) in rows {
         let codes: Vec<String> = seen.codes.iter().map(|code| code.0.to_string()).collect();
         let codes = if codes.is_empty() {
@@ -682,8 +681,12 @@ fn page_of(page: &str, rows: &[(Row, Seen)]) -> String {
         )
         .unwrap();
     }
-    let mut codes =
-        "| code | symptom | cause | cure | home is |\n|---|---|---|---|---|\n".to_owned();
+    table
+}
+
+fn codes() -> String {
+    let mut table =
+        String::from("| code | symptom | cause | cure | home is |\n|---|---|---|---|---|\n");
     for fault in FaultCode::PAGES {
         let home = if fault.code.loses_home() {
             "lost"
@@ -691,17 +694,19 @@ fn page_of(page: &str, rows: &[(Row, Seen)]) -> String {
             "kept"
         };
         let (code, symptom, cause, cure) = (fault.code.0, fault.symptom, fault.cause, fault.cure);
-        writeln!(codes, "| {code} | {symptom} | {cause} | {cure} | {home} |").unwrap();
+        writeln!(table, "| {code} | {symptom} | {cause} | {cure} | {home} |").unwrap();
     }
-    with_rows(&with_rows(page, "rows", &table), "codes", &codes)
+    table
 }
 
-/// The page with these rows between two marks.
-fn with_rows(page: &str, mark: &str, rows: &str) -> String {
-    let (open, close) = (format!("<!-- {mark} -->\n"), format!("<!-- /{mark} -->"));
-    let (before, rest) = page.split_once(&open).unwrap();
-    let (_, after) = rest.split_once(&close).unwrap();
-    format!("{before}{open}{rows}{close}{after}")
+/// The page with a table in place of what stands between `<!-- name -->` and `<!-- /name -->`.
+fn with_table(page: &str, name: &str, table: &str) -> String {
+    let (open, close) = (format!("<!-- {name} -->\n"), format!("<!-- /{name} -->"));
+    let between = page
+        .split_once(&open)
+        .and_then(|(before, rest)| Some((before, rest.split_once(&close)?.1)));
+    let (before, after) = between.unwrap_or_else(|| panic!("the page has no marks {open}"));
+    format!("{before}{open}{table}{close}{after}")
 }
 
 #[test]
@@ -722,15 +727,16 @@ fn every_fault_ends_as_its_row_says_and_the_page_is_up_to_date() {
         wrong.join("\n")
     );
 
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src/reference/faults.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(PAGE);
     let written = std::fs::read_to_string(&path).unwrap();
-    let page = page_of(&written, &seen_rows);
+    let page = with_table(&written, "rows", &outcomes_of(&seen_rows));
+    let page = with_table(&page, "codes", &codes());
     if std::env::var_os("GONIA_UPDATE_DOCS").is_some() {
         std::fs::write(&path, &page).unwrap();
         return;
     }
     assert!(
         written == page,
-        "docs/src/reference/faults.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
+        "the tables in {PAGE} are out of date: run this test with GONIA_UPDATE_DOCS=1"
     );
 }

@@ -9,7 +9,9 @@ use gonia_acquire::link::{Controller, LinkError};
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{Arm as ArmTrain, Outcome, Refusal, State, Trigger};
+use gonia_protocol::message::{
+    ControllerState, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
+};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan, WireFaults};
 use gonia_sim::rig::SimRig;
@@ -40,16 +42,16 @@ fn homed(rig: &SimRig) -> Controller {
     let ticket = arm.home().unwrap();
     assert_eq!(
         arm.wait(ticket, 4 * MINUTE_US).unwrap().outcome,
-        Outcome::Done
+        RequestOutcome::Done
     );
     arm
 }
 
-fn state(arm: &mut Controller) -> State {
+fn state(arm: &mut Controller) -> ControllerState {
     arm.status().unwrap().state
 }
 
-fn refusal(result: Result<impl Sized, LinkError>) -> Refusal {
+fn refusal(result: Result<impl Sized, LinkError>) -> RequestRefusal {
     match result {
         Err(LinkError::Refused { refusal, .. }) => refusal,
         Err(other) => panic!("{other}"),
@@ -57,8 +59,8 @@ fn refusal(result: Result<impl Sized, LinkError>) -> Refusal {
     }
 }
 
-fn train(trigger: Trigger) -> ArmTrain {
-    ArmTrain {
+fn train(trigger: TriggerRole) -> TriggerRequest {
+    TriggerRequest {
         trigger,
         exposures_us: [1000, 4000, 16_000].into_iter().collect(),
         gap_us: 500,
@@ -84,7 +86,7 @@ fn homing_finds_the_true_angle_to_the_encoders_accuracy() {
 fn nothing_moves_before_homing_and_nothing_beyond_the_limits_after_it() {
     let rig = rig_with(&[]);
     let mut arm = light(&rig);
-    assert_eq!(refusal(arm.move_to([0, 0])), Refusal::NotHomed);
+    assert_eq!(refusal(arm.move_to([0, 0])), RequestRefusal::NotHomed);
     let mut arm = homed(&rig);
     for (target, axis) in [
         ([90_000_001, 0], Axis::Theta),
@@ -94,10 +96,10 @@ fn nothing_moves_before_homing_and_nothing_beyond_the_limits_after_it() {
     ] {
         assert_eq!(
             refusal(arm.move_to(target)),
-            Refusal::TargetBeyondLimit(axis)
+            RequestRefusal::TargetBeyondLimit(axis)
         );
     }
-    assert_eq!(state(&mut arm), State::Idle);
+    assert_eq!(state(&mut arm), ControllerState::Idle);
 }
 
 #[test]
@@ -108,12 +110,15 @@ fn a_stop_slows_down_and_leaves_the_arm_at_home_with_its_position() {
     assert_eq!(arm.poll(ticket, 2_000_000).unwrap(), None);
     arm.stop().unwrap();
     let end = arm.wait(ticket, MINUTE_US).unwrap();
-    assert_eq!(end.outcome, Outcome::Stopped);
+    assert_eq!(end.outcome, RequestOutcome::Stopped);
     let status = arm.status().unwrap();
-    assert_eq!((status.state, status.homed), (State::Idle, true));
+    assert_eq!((status.state, status.homed), (ControllerState::Idle, true));
     assert!((1_000_000..59_000_000).contains(&status.axes[0].encoder_udeg));
     let ticket = arm.move_to([10_000_000, 0]).unwrap();
-    assert_eq!(arm.wait(ticket, MINUTE_US).unwrap().outcome, Outcome::Done);
+    assert_eq!(
+        arm.wait(ticket, MINUTE_US).unwrap().outcome,
+        RequestOutcome::Done
+    );
 }
 
 #[test]
@@ -121,19 +126,31 @@ fn a_silent_host_stops_a_moving_arm_and_only_a_moving_one() {
     let rig = rig_with(&[]);
     let mut arm = homed(&rig);
     arm.rest(10 * MINUTE_US).unwrap();
-    assert_eq!(state(&mut arm), State::Idle);
+    assert_eq!(state(&mut arm), ControllerState::Idle);
     let ticket = arm.move_to([0, 300_000_000]).unwrap();
     arm.rest(10_000_000).unwrap();
     let end = arm.wait(ticket, 1).unwrap();
-    assert_eq!(end.outcome, Outcome::Failed(FaultCode::LEASE_EXPIRED));
+    assert_eq!(
+        end.outcome,
+        RequestOutcome::Failed(FaultCode::HOST_WATCHDOG)
+    );
     // It slowed down: no step was lost, and home is still known.
     let stopped = arm.status().unwrap();
     assert!(stopped.homed && stopped.axes[1].encoder_udeg < 0);
-    assert_eq!(stopped.state, State::Fault(FaultCode::LEASE_EXPIRED));
-    assert_eq!(refusal(arm.move_to([0, 0])), Refusal::State(stopped.state));
+    assert_eq!(
+        stopped.state,
+        ControllerState::Fault(FaultCode::HOST_WATCHDOG)
+    );
+    assert_eq!(
+        refusal(arm.move_to([0, 0])),
+        RequestRefusal::State(stopped.state)
+    );
     arm.clear_fault().unwrap();
     let ticket = arm.move_to([0, 0]).unwrap();
-    assert_eq!(arm.wait(ticket, MINUTE_US).unwrap().outcome, Outcome::Done);
+    assert_eq!(
+        arm.wait(ticket, MINUTE_US).unwrap().outcome,
+        RequestOutcome::Done
+    );
 }
 
 #[test]
@@ -163,8 +180,8 @@ fn each_fault_of_an_axis_ends_in_its_code() {
         arm.rest(wait_us).unwrap();
         let ticket = arm.move_to([70_000_000, 0]).unwrap();
         let end = arm.wait(ticket, MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Failed(code), "{fault:?}");
-        assert_eq!(state(&mut arm), State::Fault(code));
+        assert_eq!(end.outcome, RequestOutcome::Failed(code), "{fault:?}");
+        assert_eq!(state(&mut arm), ControllerState::Fault(code));
         assert!(!arm.status().unwrap().homed);
     }
 }
@@ -182,7 +199,7 @@ fn a_switch_that_lies_is_found_out_while_homing() {
         let mut arm = light(&rig_with(&[(0, stuck)]));
         let ticket = arm.home().unwrap();
         let end = arm.wait(ticket, 4 * MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Failed(code));
+        assert_eq!(end.outcome, RequestOutcome::Failed(code));
     }
 }
 
@@ -204,17 +221,17 @@ fn after_lost_steps_or_a_slip_the_home_switch_says_that_the_encoder_is_right() {
         arm.rest(wait_us).unwrap();
         let ticket = arm.move_to([30_000_000, 0]).unwrap();
         let end = arm.wait(ticket, MINUTE_US).unwrap();
-        let disagree = FaultCode::STEPS_DISAGREE;
-        assert_eq!(end.outcome, Outcome::Failed(disagree), "{fault:?}");
+        let disagree = FaultCode::STEP_LOSS;
+        assert_eq!(end.outcome, RequestOutcome::Failed(disagree), "{fault:?}");
         arm.clear_fault().unwrap();
         let ticket = arm.home().unwrap();
         assert_eq!(
             arm.wait(ticket, 4 * MINUTE_US).unwrap().outcome,
-            Outcome::Done
+            RequestOutcome::Done
         );
         let ticket = arm.move_to([30_000_000, 0]).unwrap();
         let end = arm.wait(ticket, MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Done, "{fault:?}");
+        assert_eq!(end.outcome, RequestOutcome::Done, "{fault:?}");
         assert!((rig.true_deg(Arm::Light)[0] - 30.0).abs() < 0.012);
     }
 }
@@ -232,11 +249,14 @@ fn an_encoder_that_shifts_is_found_out_at_the_home_switch() {
         arm.rest(wait_us).unwrap();
         let ticket = arm.move_to([0, 30_000_000]).unwrap();
         let end = arm.wait(ticket, MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Failed(FaultCode::STEPS_DISAGREE));
+        assert_eq!(end.outcome, RequestOutcome::Failed(FaultCode::STEP_LOSS));
         arm.clear_fault().unwrap();
         let ticket = arm.home().unwrap();
         let end = arm.wait(ticket, 4 * MINUTE_US).unwrap();
-        assert_eq!(end.outcome, Outcome::Failed(FaultCode::HOME_MISMATCH));
+        assert_eq!(
+            end.outcome,
+            RequestOutcome::Failed(FaultCode::HOME_MISMATCH)
+        );
     }
 }
 
@@ -250,10 +270,10 @@ fn power_lost_while_saving_leaves_the_old_settings() {
     arm.save_settings().unwrap();
     arm.rest(2_000_000).unwrap();
     set(&mut arm, 13_000_000).unwrap();
-    assert_eq!(refusal(arm.save_settings()), Refusal::NoSession);
+    assert_eq!(refusal(arm.save_settings()), RequestRefusal::NoSession);
     assert!(arm.reconnect().unwrap(), "the restart is noticed");
     assert_eq!(arm.setting(Axis::Phi, Key::MaxSpeed).unwrap(), 12_000_000);
-    assert_eq!(state(&mut arm), State::Unhomed);
+    assert_eq!(state(&mut arm), ControllerState::Unhomed);
 }
 
 #[test]
@@ -263,11 +283,11 @@ fn settings_are_refused_while_moving_and_survive_a_brown_out_once_saved() {
     let crc = arm.identity().config_crc;
     let ticket = arm.move_to([5_000_000, 0]).unwrap();
     let refused = refusal(arm.set_setting(Axis::Phi, Key::MaxSpeed, 12_000_000));
-    assert_eq!(refused, Refusal::State(State::Moving));
+    assert_eq!(refused, RequestRefusal::State(ControllerState::Moving));
     arm.wait(ticket, MINUTE_US).unwrap();
     assert_eq!(
         refusal(arm.set_setting(Axis::Phi, Key::MaxSpeed, -1)),
-        Refusal::Value
+        RequestRefusal::Value
     );
     arm.set_setting(Axis::Phi, Key::MaxSpeed, 12_000_000)
         .unwrap();
@@ -275,11 +295,11 @@ fn settings_are_refused_while_moving_and_survive_a_brown_out_once_saved() {
 
     let wait_us = 3 * MINUTE_US + 1_000_000 - rig.now_us();
     arm.rest(wait_us).unwrap();
-    assert_eq!(refusal(arm.move_to([0, 0])), Refusal::NoSession);
+    assert_eq!(refusal(arm.move_to([0, 0])), RequestRefusal::NoSession);
     assert!(arm.reconnect().unwrap(), "the restart is noticed");
     assert_ne!(arm.identity().config_crc, crc);
     assert_eq!(arm.setting(Axis::Phi, Key::MaxSpeed).unwrap(), 12_000_000);
-    assert_eq!(refusal(arm.move_to([0, 0])), Refusal::NotHomed);
+    assert_eq!(refusal(arm.move_to([0, 0])), RequestRefusal::NotHomed);
 }
 
 #[test]
@@ -292,21 +312,26 @@ fn a_train_latches_every_pulse_and_refuses_to_fire_outside_the_window() {
     let mut arm = homed(&rig);
     let ticket = arm.move_to([20_000_000, 40_000_000]).unwrap();
     arm.wait(ticket, MINUTE_US).unwrap();
-    arm.arm(train(Trigger::Source)).unwrap();
+    arm.request_trigger(train(TriggerRole::Source)).unwrap();
     let ticket = arm.fire().unwrap();
-    assert_eq!(arm.wait(ticket, MINUTE_US).unwrap().outcome, Outcome::Done);
+    assert_eq!(
+        arm.wait(ticket, MINUTE_US).unwrap().outcome,
+        RequestOutcome::Done
+    );
     let times: Vec<u64> = (0..3).map(|i| arm.latch(i).unwrap().time_us).collect();
     assert_eq!([times[1] - times[0], times[2] - times[1]], [1500, 4500]);
     let given: Vec<u64> = rig.triggers().iter().map(|t| t.time_us).collect();
     assert_eq!(given, times);
 
-    arm.arm(train(Trigger::Source)).unwrap();
+    arm.request_trigger(train(TriggerRole::Source)).unwrap();
     while rig.now_us() < 2 * MINUTE_US + 1000 {
         arm.keep_alive().unwrap();
         arm.rest(100_000).unwrap();
     }
     match refusal(arm.fire()) {
-        Refusal::OutsideWindow(Axis::Phi, error) => assert!((90_000..110_000).contains(&error)),
+        RequestRefusal::OutsideWindow(Axis::Phi, error) => {
+            assert!((90_000..110_000).contains(&error))
+        }
         other => panic!("{other:?}"),
     }
     assert_eq!(rig.triggers().len(), 3);
@@ -322,13 +347,16 @@ fn one_arms_emergency_stop_stops_the_other_and_is_cleared_from_its_source() {
     camera.poll(homing, 1_000_000).unwrap();
     light.emergency_stop().unwrap();
     let end = camera.wait(homing, MINUTE_US).unwrap();
-    assert_eq!(end.outcome, Outcome::Failed(FaultCode::INTERLOCK_OPEN));
-    let remains = Refusal::CauseRemains(FaultCode::INTERLOCK_OPEN);
+    assert_eq!(
+        end.outcome,
+        RequestOutcome::Failed(FaultCode::INTERLOCK_OPEN)
+    );
+    let remains = RequestRefusal::CauseRemains(FaultCode::INTERLOCK_OPEN);
     assert_eq!(refusal(camera.clear_fault()), remains);
     light.clear_fault().unwrap();
     camera.rest(100_000).unwrap();
     camera.clear_fault().unwrap();
-    assert_eq!(state(&mut camera), State::Unhomed);
+    assert_eq!(state(&mut camera), ControllerState::Unhomed);
 }
 
 #[test]
@@ -350,7 +378,7 @@ fn firmware_of_another_schema_is_named_and_not_moved() {
                 last_panic: Default::default(),
             };
             let answer = gonia_protocol::message::Message::Identity(identity);
-            self.0 = gonia_protocol::frame::encode(NODE_LIGHT, 1, &answer)
+            self.0 = gonia_protocol::packet::encode(NODE_LIGHT, 1, &answer)
                 .unwrap()
                 .to_vec();
             Ok(())

@@ -14,11 +14,14 @@ use std::time::{Duration, Instant};
 use gonia_acquire::link::{Controller, LinkError, StreamTransport, Transport};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{Arm, Outcome, Refusal, State, Trigger};
+use gonia_protocol::message::{
+    ControllerState, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
+};
 use gonia_protocol::settings::{Axis, Key};
-use gonia_sim::bench::Bench;
-use gonia_sim::fault::FaultPlan;
-use gonia_sim::rig::{self, SimRig};
+use gonia_sim::arm::SimulatedArm;
+use gonia_sim::fault::{Arm, FaultPlan};
+use gonia_sim::rig::SimRig;
+use gonia_tests::random::uniform;
 
 const MINUTE_US: u64 = 60_000_000;
 const N_POSES: usize = 50;
@@ -84,20 +87,15 @@ fn start(elf: &Path, folder: &Path) -> (Qemu, StreamTransport) {
 /// A wire that flips a bit of a byte now and then, both ways.
 struct Bent<T> {
     wire: T,
-    state: u32,
+    bytes: usize,
 }
 
 impl<T> Bent<T> {
     fn bend(&mut self, bytes: &mut [u8], one_in: u32) {
         for byte in bytes {
-            // A linear congruential generator (Numerical Recipes): as good as a wire's bad luck.
-            self.state = self
-                .state
-                .wrapping_mul(1_664_525)
-                .wrapping_add(1_013_904_223);
-            let dice = self.state >> 8;
-            if dice.is_multiple_of(one_in) {
-                *byte ^= 1 << (dice / one_in % 8);
+            self.bytes += 1;
+            if uniform(1, self.bytes) * f64::from(one_in) < 1.0 {
+                *byte ^= 1 << (uniform(2, self.bytes) * 8.0) as u32;
             }
         }
     }
@@ -125,7 +123,7 @@ impl<T: Transport> Transport for Bent<T> {
 /// What the host got to know, without times.
 struct Seen {
     /// Where each move ended, by encoder.
-    ends: Vec<(Outcome, [i32; 2])>,
+    ends: Vec<(RequestOutcome, [i32; 2])>,
     /// What each pulse latched.
     latches: Vec<([i32; 2], bool)>,
     /// Before the arm is stopped in mid-move: where its steps say it is, µdeg, corrections, and steps
@@ -138,7 +136,7 @@ struct Seen {
 fn home(arm: &mut Controller) {
     let homing = arm.home().unwrap();
     let end = arm.wait(homing, 2 * MINUTE_US).unwrap();
-    assert_eq!(end.outcome, Outcome::Done);
+    assert_eq!(end.outcome, RequestOutcome::Done);
     assert!(arm.status().unwrap().homed);
 }
 
@@ -157,14 +155,14 @@ fn session(arm: &mut Controller) -> Seen {
     let not_homed = matches!(
         refused,
         Err(LinkError::Refused {
-            refusal: Refusal::NotHomed,
+            refusal: RequestRefusal::NotHomed,
             ..
         })
     );
     assert!(not_homed);
     let faster = [
         (Key::Acceleration, 60_000_000),
-        (Key::SettleWindow, 40_000),
+        (Key::SettlingTime, 40_000),
         (Key::HomeSlowSpeed, 1_000_000),
         (Key::HomeBackoff, 300_000),
     ];
@@ -195,9 +193,9 @@ fn session(arm: &mut Controller) -> Seen {
             }
             STOP_AFTER => {
                 arm.emergency_stop().unwrap();
-                assert_eq!(arm.status().unwrap().state, State::EStop);
+                assert_eq!(arm.status().unwrap().state, ControllerState::EStop);
                 arm.clear_fault().unwrap();
-                assert_eq!(arm.status().unwrap().state, State::Unhomed);
+                assert_eq!(arm.status().unwrap().state, ControllerState::Unhomed);
                 home(arm);
             }
             _ => {}
@@ -214,26 +212,34 @@ fn session(arm: &mut Controller) -> Seen {
 
 /// The host falls silent in mid-move: the arm stops by itself, latches, and is cleared.
 fn silence(arm: &mut Controller) {
-    arm.set_setting(Axis::Theta, Key::Lease, 200_000).unwrap();
+    arm.set_setting(Axis::Theta, Key::HostWatchdog, 200_000)
+        .unwrap();
     arm.move_to([0, -100_000_000]).unwrap();
     arm.rest(1_500_000).unwrap();
     let status = arm.status().unwrap();
-    assert_eq!(status.state, State::Fault(FaultCode::LEASE_EXPIRED));
+    assert_eq!(
+        status.state,
+        ControllerState::Fault(FaultCode::HOST_WATCHDOG)
+    );
     assert!(status.homed, "it slowed down: no step was lost");
     arm.clear_fault().unwrap();
-    arm.set_setting(Axis::Theta, Key::Lease, 2_000_000).unwrap();
+    arm.set_setting(Axis::Theta, Key::HostWatchdog, 2_000_000)
+        .unwrap();
 }
 
 fn train(arm: &mut Controller) -> Vec<([i32; 2], bool)> {
     let pulses = [1000, 4000, 16_000];
-    let train = Arm {
-        trigger: Trigger::Source,
+    let train = TriggerRequest {
+        trigger: TriggerRole::Source,
         exposures_us: pulses.into_iter().collect(),
         gap_us: 500,
     };
-    arm.arm(train).unwrap();
+    arm.request_trigger(train).unwrap();
     let fired = arm.fire().unwrap();
-    assert_eq!(arm.wait(fired, MINUTE_US).unwrap().outcome, Outcome::Done);
+    assert_eq!(
+        arm.wait(fired, MINUTE_US).unwrap().outcome,
+        RequestOutcome::Done
+    );
     let latch = |pulse| {
         let latch = arm.latch(pulse).unwrap();
         (latch.encoder_udeg, latch.within)
@@ -249,23 +255,26 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     let (_qemu, transport) = start(&elf, folder.path());
     let bent = Bent {
         wire: transport,
-        state: 1,
+        bytes: 0,
     };
     let mut arm = Controller::connect(Box::new(bent), NODE_LIGHT).unwrap();
     assert_eq!(arm.identity().board.as_str(), "qemu-mps2");
     assert_eq!(arm.identity().firmware, gonia_firmware::VERSION);
     let in_qemu = session(&mut arm);
     let status = arm.status().unwrap();
-    let (good, bad) = (status.frames_good, status.frames_bad);
+    let (good, bad) = (status.packets_good, status.packets_bad);
     let (lost, repeated) = arm.losses();
     println!(
         "QEMU: {N_POSES} poses; frames {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
     );
     assert!(bad > 0 && repeated > 0, "the wire bent nothing");
 
-    let arms = [Bench::quiet_arm_near_home(), Bench::default_arm(2)];
+    let arms = [
+        SimulatedArm::quiet_arm_near_home(),
+        SimulatedArm::default_arm(2),
+    ];
     let rig = SimRig::with_arms(1, FaultPlan::default(), arms);
-    let port = Box::new(rig.port(rig::Arm::Light));
+    let port = Box::new(rig.port(Arm::Light));
     let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
     let simulated = session(&mut arm);
     let after = SILENT_AFTER + 1;

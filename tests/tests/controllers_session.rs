@@ -43,7 +43,7 @@ fn run(seed: u64, faults: FaultPlan, poses: &[Pose]) -> Session {
 }
 
 #[test]
-fn every_pose_of_a_good_day_is_kept_and_truly_there() {
+fn without_faults_every_pose_is_kept_and_truly_there() {
     let poses = scattered(150);
     let session = run(7, FaultPlan::default(), &poses);
     assert_eq!(session.refused, Vec::<String>::new());

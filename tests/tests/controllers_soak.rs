@@ -7,11 +7,11 @@
 use std::sync::{Arc, Mutex};
 
 use gonia_acquire::link::{Controller, Transport};
-use gonia_firmware::controller::Controller as Firmware;
+use gonia_firmware::controller::ArmController;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::node::{Node, identity};
-use gonia_firmware::settings::Settings;
-use gonia_firmware::steps::{Period, Progress};
+use gonia_firmware::node::{ControllerNode, identity};
+use gonia_firmware::settings::ControllerSettings;
+use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::message::ResetReason;
 use gonia_protocol::settings::{Axis, Key};
@@ -38,8 +38,8 @@ struct Board {
 
 impl Hardware for Board {
     fn queue_step(&mut self, _: Axis, _: Period) {}
-    fn progress(&mut self, _: Axis) -> Progress {
-        Progress::default()
+    fn progress(&mut self, _: Axis) -> StepProgress {
+        StepProgress::default()
     }
     fn halt(&mut self, _: Axis) {}
     fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
@@ -54,7 +54,7 @@ impl Hardware for Board {
     fn hold_interlock_open(&mut self, _: bool) {}
     fn set_trigger(&mut self, _: bool) {}
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
-        let settings = Settings::from_bytes(bytes).map_err(|_| NotSaved)?;
+        let settings = ControllerSettings::from_bytes(bytes).map_err(|_| NotSaved)?;
         self.saved.push(settings.get(Axis::Theta, Key::Telemetry));
         Ok(())
     }
@@ -63,7 +63,7 @@ impl Hardware for Board {
 /// Both ends of the line and what is under way, in virtual time.
 struct Line {
     now_us: u64,
-    node: Node,
+    node: ControllerNode,
     board: Board,
     to_device: Wire,
     to_host: Wire,
@@ -74,7 +74,7 @@ impl Line {
         let identity = identity("soak", 1, ResetReason::PowerOn, "");
         Self {
             now_us: 0,
-            node: Node::new(NODE_LIGHT, identity, Firmware::new(0, None)),
+            node: ControllerNode::new(NODE_LIGHT, identity, ArmController::new(0, None)),
             board: Board::default(),
             to_device: Wire::new(FAULTS, 2 * seed),
             to_host: Wire::new(FAULTS, 2 * seed + 1),
@@ -90,7 +90,7 @@ impl Line {
         while let Some(byte) = self.to_device.take(self.now_us) {
             self.node.receive(byte, self.now_us, &mut self.board);
         }
-        while let Some(frame) = self.node.take_frame() {
+        while let Some(frame) = self.node.take_packet() {
             self.to_host.send(self.now_us, &frame);
         }
     }
@@ -146,8 +146,8 @@ fn soak(seed: u64, commands: u32) {
          device: {} good, {} bent; {:.1} h virtual",
         done.len(),
         commands / 2,
-        status.frames_good,
-        status.frames_bad,
+        status.packets_good,
+        status.packets_bad,
         line.now_us as f64 / 3.6e9
     );
     // None lost, none twice, none before its turn, and each with the value set just before.
@@ -159,9 +159,9 @@ fn soak(seed: u64, commands: u32) {
         repeats > commands / 20,
         "the wire was not bad enough: {repeats}"
     );
-    assert!(status.frames_bad > commands / 20);
+    assert!(status.packets_bad > commands / 20);
     // What arrived whole more than once was answered and not done again.
-    assert!(status.frames_good > commands + 1);
+    assert!(status.packets_good > commands + 1);
 }
 
 #[test]

@@ -6,8 +6,10 @@
 use std::io;
 
 use gonia_acquire::link::{Controller, LinkError, Transport};
-use gonia_protocol::frame::{Decoder, encode};
-use gonia_protocol::message::{Arm as Train, Hello, Message, Move, Refusal, Setting, Trigger};
+use gonia_protocol::message::{
+    Hello, Message, Move, RequestRefusal, Setting, TriggerRequest, TriggerRole,
+};
+use gonia_protocol::packet::{Decoder, encode};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY, crc32c};
 use gonia_sim::fault::{Arm, FaultPlan};
@@ -20,8 +22,8 @@ fn motions() -> Vec<Message> {
         Message::Move(Move {
             target_udeg: [0, 0],
         }),
-        Message::Arm(Train {
-            trigger: Trigger::Source,
+        Message::RequestTrigger(TriggerRequest {
+            trigger: TriggerRole::Source,
             exposures_us: [1000].into_iter().collect(),
             gap_us: 500,
         }),
@@ -82,7 +84,7 @@ fn new_firmware_refuses_every_motion_of_a_host_of_another_version() {
         for message in motions() {
             assert_eq!(
                 ask(&message),
-                Message::Refused(Refusal::Version),
+                Message::Refused(RequestRefusal::Version),
                 "{message:?}"
             );
         }

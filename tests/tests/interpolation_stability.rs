@@ -17,6 +17,7 @@ use gonia_brdf::interpolate::{self, Data, FillSettings, Origin};
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Brdf, Direction, Grid, Sample};
+use gonia_tests::random::uniform;
 use rayon::prelude::*;
 
 /// A small plan: 43 lights and as many views, nine points of the disc each.
@@ -148,7 +149,7 @@ fn rows() -> Vec<Row> {
             |truth| {
                 let mut samples = plan(truth);
                 for (k, sample) in samples.iter_mut().enumerate() {
-                    if noise(7, k) < 0.01 {
+                    if uniform(7, k) < 0.01 {
                         sample.rgb = sample.rgb.map(|v| 8.0 * v);
                     }
                 }
@@ -207,7 +208,7 @@ fn rows() -> Vec<Row> {
             |truth| {
                 let mut samples = plan(truth);
                 for (k, sample) in samples.iter_mut().enumerate() {
-                    match noise(11, k) {
+                    match uniform(11, k) {
                         x if x < 0.02 => sample.rgb[1] = f32::NAN,
                         x if x < 0.04 => sample.rgb = [-0.05; 3],
                         _ => {}
@@ -631,22 +632,12 @@ fn pairs_across_borders(truth: &dyn Brdf) -> Vec<Sample> {
 fn clustered(truth: &dyn Brdf) -> Vec<Sample> {
     let mut samples: Vec<Sample> = plan(truth).into_iter().step_by(5).collect();
     for k in 0..5000 {
-        let off = |axis| 10.0 * noise(axis, k) - 5.0;
+        let off = |axis| 10.0 * uniform(axis, k) - 5.0;
         let i = Direction::from_deg(40.0 + off(1), 100.0 + off(2));
         let v = Direction::from_deg(30.0 + off(3), 250.0 + off(4));
         samples.push(sample(truth, i, v, 100_000));
     }
     samples
-}
-
-/// A number in 0 .. 1 that a counter makes.
-fn noise(stream: u64, k: usize) -> f64 {
-    let mut x = (k as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (stream << 56 | stream);
-    x ^= x >> 31;
-    x = x.wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x ^= x >> 29;
-    x = x.wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x >> 11) as f64 / (1u64 << 53) as f64
 }
 
 struct Constant;

@@ -7,7 +7,7 @@ use gonia_protocol::settings::{Axis, Key};
 use crate::error_map::{ErrorMap, GearMap};
 use crate::hardware::Hardware;
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
-use crate::settings::Settings;
+use crate::settings::ControllerSettings;
 use crate::steps::{DEPTH, End, Period};
 
 const TURN_UDEG: i64 = 360_000_000;
@@ -64,7 +64,7 @@ struct Encoder {
 
 /// A reading of the encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub enum EncoderReading {
     /// Good.
     Fresh,
     /// Bad; the last good position still stands.
@@ -73,7 +73,7 @@ pub enum Reading {
 
 impl AxisDrive {
     /// An axis at rest that has not been read yet.
-    pub fn new(axis: Axis, settings: &Settings) -> Self {
+    pub fn new(axis: Axis, settings: &ControllerSettings) -> Self {
         Self {
             axis,
             profile: None,
@@ -109,7 +109,7 @@ impl AxisDrive {
         self.profile.is_some() || self.is_playing
     }
 
-    /// Where the encoder says the axis is, µdeg.
+    /// The encoder's reading, µdeg.
     pub fn encoder_udeg(&self) -> i32 {
         self.encoder.udeg
     }
@@ -126,7 +126,7 @@ impl AxisDrive {
         (self.steps - since_steps) * TURN_UDEG / self.steps_per_turn
     }
 
-    /// For people.
+    /// What the status of the controller says of this axis.
     pub fn status(&self) -> AxisStatus {
         AxisStatus {
             commanded_udeg: self.commanded_udeg(),
@@ -138,7 +138,7 @@ impl AxisDrive {
     }
 
     /// Takes note of the steps that the timer has given since the last time.
-    pub fn look(&mut self, hardware: &mut impl Hardware) {
+    pub fn take_progress(&mut self, hardware: &mut impl Hardware) {
         let progress = hardware.progress(self.axis);
         self.steps += i64::from(progress.given.wrapping_sub(self.given));
         self.given = progress.given;
@@ -192,14 +192,14 @@ impl AxisDrive {
     }
 
     /// Starts a run to an absolute angle.
-    pub fn go_to(&mut self, target_udeg: i32, settings: &Settings) {
+    pub fn go_to(&mut self, target_udeg: i32, settings: &ControllerSettings) {
         let way_udeg = i64::from(target_udeg) - i64::from(self.encoder.udeg);
         self.go_by(way_udeg, settings);
     }
 
     /// Starts a run over an angle; its last part always leads up, so that the gear's backlash is
     /// taken from one side.
-    pub fn go_by(&mut self, way_udeg: i64, settings: &Settings) {
+    pub fn go_by(&mut self, way_udeg: i64, settings: &ControllerSettings) {
         let ramp = self.ramp(settings, Key::MaxSpeed);
         let steps = self.steps_of(way_udeg);
         if steps >= 0 {
@@ -226,11 +226,11 @@ impl AxisDrive {
         // A turn may be among what is dropped.
         self.queued_forward = None;
         hardware.halt(self.axis);
-        self.look(hardware);
+        self.take_progress(hardware);
     }
 
     /// Counts a correction of an error of so many µdeg; a large one means that steps were missed.
-    pub fn note_correction(&mut self, error_udeg: i32, settings: &Settings) {
+    pub fn note_correction(&mut self, error_udeg: i32, settings: &ControllerSettings) {
         self.corrections += 1;
         // Half the take-up is more than backlash and ringing leave; a lost magnetic cycle is more.
         if error_udeg.unsigned_abs()
@@ -242,7 +242,7 @@ impl AxisDrive {
     }
 
     /// Compares steps and encoder: the error and whether it is within its limit.
-    pub fn is_following(&mut self, settings: &Settings) -> bool {
+    pub fn is_following(&mut self, settings: &ControllerSettings) -> bool {
         let run_udeg = (self.base_udeg + self.turned_udeg(self.base_steps)) as i32;
         let error = run_udeg - self.encoder.udeg;
         self.following_udeg = self.following_udeg.max(error.saturating_abs());
@@ -253,19 +253,19 @@ impl AxisDrive {
     pub fn read(
         &mut self,
         now_us: u64,
-        settings: &Settings,
+        settings: &ControllerSettings,
         hardware: &mut impl Hardware,
-    ) -> Result<Reading, FaultCode> {
+    ) -> Result<EncoderReading, FaultCode> {
         let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
         let encoder = &mut self.encoder;
         let (counts, fault) = match hardware.encoder_counts(self.axis) {
             Ok(raw) if i64::from(raw) < turn => {
                 let Some(last_raw) = encoder.raw else {
-                    // The first reading: somewhere within half a turn of 0, until homing knows better.
+                    // The first reading: somewhere within half a turn of 0, until homing.
                     encoder.raw = Some(raw);
                     encoder.read_us = now_us;
                     encoder.set_counts(wrap(i64::from(raw) - encoder.zero, turn), turn);
-                    return Ok(Reading::Fresh);
+                    return Ok(EncoderReading::Fresh);
                 };
                 let moved = wrap(i64::from(raw) - i64::from(last_raw), turn);
                 let speed = i64::from(settings.get(self.axis, Key::MaxSpeed));
@@ -284,13 +284,13 @@ impl AxisDrive {
             encoder.set_counts(counts, turn);
             encoder.read_us = now_us;
             encoder.bad_readings = 0;
-            return Ok(Reading::Fresh);
+            return Ok(EncoderReading::Fresh);
         }
         encoder.bad_readings = encoder.bad_readings.saturating_add(1);
         if encoder.bad_readings >= MAX_BAD_READINGS {
             Err(fault)
         } else {
-            Ok(Reading::Stale)
+            Ok(EncoderReading::Stale)
         }
     }
 
@@ -301,8 +301,8 @@ impl AxisDrive {
     }
 
     /// The axis stands at the home switch: chooses the encoder's turn that is nearest to the home
-    /// angle, or says that there is none within the tolerance.
-    pub fn set_turn_at_home(&mut self, settings: &Settings) -> Result<(), FaultCode> {
+    /// angle; an error where none is within the tolerance.
+    pub fn set_turn_at_home(&mut self, settings: &ControllerSettings) -> Result<(), FaultCode> {
         let home = i64::from(settings.get(self.axis, Key::HomeAngle));
         let off = (i64::from(self.encoder.udeg) - home + TURN_UDEG / 2).rem_euclid(TURN_UDEG)
             - TURN_UDEG / 2;
@@ -328,10 +328,10 @@ impl AxisDrive {
         self.home = Some((self.steps, encoder_udeg));
     }
 
-    /// How far the encoder, which says this in the mean, is ahead of the steps, both counted from home,
+    /// How far the encoder, with this mean reading, is ahead of the steps, both counted from home,
     /// µdeg. At rest, come to from below, what is left of the gear's error and of the encoder's is all
     /// that is in it.
-    pub fn disagreement_udeg(&self, encoder_udeg: i64) -> i64 {
+    pub fn step_loss_udeg(&self, encoder_udeg: i64) -> i64 {
         self.home.map_or(0, |(steps, home_udeg)| {
             let gear = self.gear.ahead_udeg(encoder_udeg) - self.gear.ahead_udeg(home_udeg);
             encoder_udeg - home_udeg - self.turned_udeg(steps) - gear
@@ -339,11 +339,11 @@ impl AxisDrive {
     }
 
     /// A ramp up to the speed of a key.
-    pub fn ramp(&self, settings: &Settings, speed: Key) -> Ramp {
+    pub fn ramp(&self, settings: &ControllerSettings, speed: Key) -> Ramp {
         Ramp::new(
             settings.get_u64(self.axis, speed),
             settings.get_u64(self.axis, Key::Acceleration),
-            settings.get_u64(self.axis, Key::AccelerationRise),
+            settings.get_u64(self.axis, Key::JerkTime),
             self.steps_per_turn.unsigned_abs(),
         )
     }
@@ -354,7 +354,7 @@ impl AxisDrive {
     }
 
     /// Takes up settings that may have changed. Only at rest.
-    pub fn apply(&mut self, settings: &Settings) {
+    pub fn apply(&mut self, settings: &ControllerSettings) {
         self.steps_per_turn = i64::from(settings.get(self.axis, Key::StepsPerTurn));
         self.encoder.map = ErrorMap::new(self.axis, settings);
         self.gear = GearMap::new(self.axis, settings);

@@ -9,7 +9,7 @@
 
 use gonia_protocol::settings::{Axis, Key};
 
-use crate::settings::Settings;
+use crate::settings::ControllerSettings;
 
 /// Fraction bits of [`sine`].
 const SINE_BITS: u32 = 30;
@@ -30,7 +30,7 @@ pub struct ErrorMap {
 
 impl ErrorMap {
     /// The map in the settings; all zeros where the encoder was never calibrated.
-    pub fn new(axis: Axis, settings: &Settings) -> Self {
+    pub fn new(axis: Axis, settings: &ControllerSettings) -> Self {
         let get = |key| settings.get(axis, key);
         Self {
             cos: [get(Key::EncoderCos1), get(Key::EncoderCos2)],
@@ -58,7 +58,7 @@ pub struct GearMap {
 
 impl GearMap {
     /// The map in the settings; nothing where the gear was never calibrated.
-    pub fn new(axis: Axis, settings: &Settings) -> Self {
+    pub fn new(axis: Axis, settings: &ControllerSettings) -> Self {
         let get = |key| settings.get(axis, key);
         Self {
             worm_turn_udeg: i64::from(get(Key::WormTurn)),

@@ -2,7 +2,7 @@
 
 use gonia_protocol::settings::Axis;
 
-use crate::steps::{Period, Progress};
+use crate::steps::{Period, StepProgress};
 
 /// The encoder did not answer, or its answer failed its own check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub trait Hardware {
     fn queue_step(&mut self, axis: Axis, period: Period);
 
     /// How far the step timer of an axis is.
-    fn progress(&mut self, axis: Axis) -> Progress;
+    fn progress(&mut self, axis: Axis) -> StepProgress;
 
     /// No step of this axis after this; whatever waits is dropped.
     fn halt(&mut self, axis: Axis);

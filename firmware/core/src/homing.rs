@@ -1,6 +1,6 @@
 //! How one axis finds home: fast seek, back off, slow approach, zero.
 //!
-//! The switch is closed at and below the home angle. It tells only *which turn* the shaft is in;
+//! The switch is closed at and below the home angle. It shows only *which turn* the shaft is in;
 //! the angle within the turn is the absolute encoder's, so the switch's own repeatability (some
 //! 0.01°) does not enter the zero.
 
@@ -9,19 +9,19 @@ use gonia_protocol::settings::Key;
 
 use crate::axis::AxisDrive;
 use crate::hardware::Hardware;
-use crate::settings::Settings;
+use crate::settings::ControllerSettings;
 
 /// Equal readings that end a bounce of the switch (at one reading every 2 ms).
 const DEBOUNCE: u8 = 3;
 /// The slow way off the switch is this part of the fast search's speed.
 const CLEARING_SLOWDOWN: u64 = 4;
-/// Patiences of settling until an arm has swung out.
+/// Settling timeouts until an arm has swung out.
 const SWING_OUT: u64 = 2;
 /// How many back-offs below the switch an axis may stand at the start.
 const MAX_BELOW: i64 = 10;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum HomingPhase {
     /// At rest, until the switch's reading is steady.
     Look,
     /// Fast, down, until the switch closes.
@@ -42,7 +42,7 @@ enum Phase {
     Rest {
         until_us: u64,
     },
-    /// For another patience the encoder is read: steps and encoder are compared from here on.
+    /// For another settling timeout the encoder is read: steps and encoder are compared from here on.
     Read {
         until_us: u64,
     },
@@ -52,7 +52,7 @@ enum Phase {
 /// The search of one axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Homing {
-    phase: Phase,
+    phase: HomingPhase,
     same_readings: u8,
     last_reading: bool,
     /// Of the encoder at rest.
@@ -64,7 +64,7 @@ impl Homing {
     /// Begins, with the axis at rest.
     pub fn begin(switch_closed: bool) -> Self {
         Self {
-            phase: Phase::Look,
+            phase: HomingPhase::Look,
             same_readings: 1,
             last_reading: switch_closed,
             rest_sum: 0,
@@ -79,7 +79,7 @@ impl Homing {
 
     /// Whether this axis is home and at rest.
     pub fn is_done(&self) -> bool {
-        self.phase == Phase::Done
+        self.phase == HomingPhase::Done
     }
 
     /// Looks at switch and motion, every control tick.
@@ -88,68 +88,68 @@ impl Homing {
         now_us: u64,
         switch_closed: bool,
         drive: &mut AxisDrive,
-        settings: &Settings,
+        settings: &ControllerSettings,
         hardware: &mut impl Hardware,
     ) -> Result<(), FaultCode> {
         let steady = self.is_steady(switch_closed);
         let backoff = i64::from(settings.get(drive.axis(), Key::HomeBackoff));
         match self.phase {
-            Phase::Look if steady && switch_closed => self.clear(drive, settings),
-            Phase::Look if steady => {
+            HomingPhase::Look if steady && switch_closed => self.clear(drive, settings),
+            HomingPhase::Look if steady => {
                 // The whole travel, and a tenth more.
                 let axis = drive.axis();
                 let travel = i64::from(settings.get(axis, Key::SoftMax))
                     - i64::from(settings.get(axis, Key::HomeAngle));
                 let ramp = drive.ramp(settings, Key::HomeFastSpeed);
                 drive.run(-drive.steps_of(travel * 11 / 10), ramp);
-                self.phase = Phase::Seek;
+                self.phase = HomingPhase::Seek;
             }
-            Phase::Seek if switch_closed && steady => {
+            HomingPhase::Seek if switch_closed && steady => {
                 drive.decelerate();
-                self.phase = Phase::Stop;
+                self.phase = HomingPhase::Stop;
             }
-            Phase::Seek if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
-            Phase::Stop if !drive.is_moving() => self.clear(drive, settings),
-            Phase::Clear if !switch_closed && steady => {
+            HomingPhase::Seek if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            HomingPhase::Stop if !drive.is_moving() => self.clear(drive, settings),
+            HomingPhase::Clear if !switch_closed && steady => {
                 drive.decelerate();
-                self.phase = Phase::StopAbove;
+                self.phase = HomingPhase::StopAbove;
             }
-            Phase::Clear if !drive.is_moving() => return Err(FaultCode::HOME_SWITCH_STUCK),
-            Phase::StopAbove if !drive.is_moving() => {
+            HomingPhase::Clear if !drive.is_moving() => return Err(FaultCode::HOME_SWITCH_STUCK),
+            HomingPhase::StopAbove if !drive.is_moving() => {
                 drive.run(drive.steps_of(backoff), clearing_ramp(drive, settings));
-                self.phase = Phase::BackOff;
+                self.phase = HomingPhase::BackOff;
             }
-            Phase::BackOff if !drive.is_moving() => {
+            HomingPhase::BackOff if !drive.is_moving() => {
                 if switch_closed {
                     return Err(FaultCode::HOME_SWITCH_STUCK);
                 }
                 let ramp = drive.ramp(settings, Key::HomeSlowSpeed);
                 drive.run(-drive.steps_of(backoff * 3), ramp);
-                self.phase = Phase::Approach;
+                self.phase = HomingPhase::Approach;
             }
             // The first contact counts, bounce or not: the encoder has the angle.
-            Phase::Approach if switch_closed => {
+            HomingPhase::Approach if switch_closed => {
                 drive.halt(hardware);
                 drive.set_turn_at_home(settings)?;
                 drive.go_to(settings.get(drive.axis(), Key::SoftMin), settings);
-                self.phase = Phase::Park;
+                self.phase = HomingPhase::Park;
             }
-            Phase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
-            Phase::Park if !drive.is_moving() => {
-                let patience_us = settings.get_u64(drive.axis(), Key::SettlePatience);
-                let until_us = now_us + SWING_OUT * patience_us;
-                self.phase = Phase::Rest { until_us };
+            HomingPhase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            HomingPhase::Park if !drive.is_moving() => {
+                let timeout_us = settings.get_u64(drive.axis(), Key::SettlingTimeout);
+                let until_us = now_us + SWING_OUT * timeout_us;
+                self.phase = HomingPhase::Rest { until_us };
             }
-            Phase::Rest { until_us } if now_us >= until_us => {
-                let patience_us = settings.get_u64(drive.axis(), Key::SettlePatience);
-                let until_us = now_us + patience_us;
-                self.phase = Phase::Read { until_us };
+            HomingPhase::Rest { until_us } if now_us >= until_us => {
+                let timeout_us = settings.get_u64(drive.axis(), Key::SettlingTimeout);
+                let until_us = now_us + timeout_us;
+                self.phase = HomingPhase::Read { until_us };
             }
-            Phase::Read { until_us } => {
+            HomingPhase::Read { until_us } => {
                 self.rest_sum += i64::from(drive.encoder_udeg());
                 self.rest_count += 1;
                 if now_us >= until_us {
-                    self.phase = Phase::Done;
+                    self.phase = HomingPhase::Done;
                 }
             }
             _ => {}
@@ -157,16 +157,16 @@ impl Homing {
         Ok(())
     }
 
-    fn clear(&mut self, drive: &mut AxisDrive, settings: &Settings) {
+    fn clear(&mut self, drive: &mut AxisDrive, settings: &ControllerSettings) {
         let get = |key| i64::from(settings.get(drive.axis(), key));
         // What the fast search ran past the switch: v²/2a, and half the rise at full speed.
         let speed = get(Key::HomeFastSpeed);
         let overrun = speed.pow(2) / (2 * get(Key::Acceleration)).max(1)
-            + speed * get(Key::AccelerationRise) / 2_000_000;
+            + speed * get(Key::JerkTime) / 2_000_000;
         let way = overrun + MAX_BELOW * get(Key::HomeBackoff);
         drive.run(drive.steps_of(way), clearing_ramp(drive, settings));
         self.same_readings = 0;
-        self.phase = Phase::Clear;
+        self.phase = HomingPhase::Clear;
     }
 
     fn is_steady(&mut self, reading: bool) -> bool {
@@ -180,11 +180,11 @@ impl Homing {
     }
 }
 
-fn clearing_ramp(drive: &AxisDrive, settings: &Settings) -> crate::profile::Ramp {
+fn clearing_ramp(drive: &AxisDrive, settings: &ControllerSettings) -> crate::profile::Ramp {
     crate::profile::Ramp::new(
         settings.get_u64(drive.axis(), Key::HomeFastSpeed) / CLEARING_SLOWDOWN,
         settings.get_u64(drive.axis(), Key::Acceleration),
-        settings.get_u64(drive.axis(), Key::AccelerationRise),
+        settings.get_u64(drive.axis(), Key::JerkTime),
         settings.get_u64(drive.axis(), Key::StepsPerTurn),
     )
 }

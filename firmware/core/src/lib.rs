@@ -1,21 +1,23 @@
 //! The arm controller's logic: no hardware, no clock of its own, no allocation.
 //!
-//! Bytes go in through [`node::Node::receive`], time through [`node::Node::poll`]; pins, encoders
+//! Bytes go in through [`node::ControllerNode::receive`], time through [`node::ControllerNode::poll`]; pins, encoders
 //! and flash are behind [`hardware::Hardware`]. The same code runs on a board and in the simulator.
 //!
 //! | room | subject |
 //! |---|---|
-//! | [`node`] | the wire's end: frames to commands, answers and events to frames |
+//! | [`node`] | the wire's end: packets to commands, answers and events to packets |
 //! | [`controller`] | the states and their one owner |
 //! | [`axis`] | one axis: steps, encoder, segments of a move |
 //! | [`profile`], [`steps`] | when the next step is due; from the main loop to the timer that gives it |
-//! | [`homing`], [`settle`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
+//! | [`homing`], [`settling`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
 //! | [`error_map`] | what the encoder reads wrong over a turn, and its removal |
 //! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
+//! | [`board`] | the main loop of every board, and what a board gives it |
 //! | [`hardware`], [`ssi`] | what a board must offer; an absolute encoder over `embedded-hal` |
 #![no_std]
 
 pub mod axis;
+pub mod board;
 pub mod controller;
 pub mod error_map;
 pub mod hardware;
@@ -23,7 +25,7 @@ pub mod homing;
 pub mod node;
 pub mod profile;
 pub mod settings;
-pub mod settle;
+pub mod settling;
 pub mod ssi;
 pub mod steps;
 pub mod store;

@@ -1,15 +1,15 @@
-//! The wire's end of a controller: bytes to requests, answers and events to frames.
+//! The wire's end of a controller: bytes to requests, answers and events to packets.
 
-use gonia_protocol::frame::{Decoder, FrameBytes, Received, encode};
-use gonia_protocol::link::{Arrival, Responder};
-use gonia_protocol::message::{Identity, Message, Refusal, ResetReason};
+use gonia_protocol::link::{IncomingRequest, Responder};
+use gonia_protocol::message::{Identity, Message, RequestRefusal, ResetReason};
+use gonia_protocol::packet::{Decoder, PacketBytes, Received, encode};
 use gonia_protocol::{NODE_ANY, PROTOCOL_VERSION, SCHEMA_KEY};
 use heapless::Deque;
 
-use crate::controller::Controller;
+use crate::controller::ArmController;
 use crate::hardware::Hardware;
 
-/// Who a controller is that has just started. Git state, versions and schema are this firmware's.
+/// Identity of a controller that has just started. Git state, versions and schema are this firmware's.
 pub fn identity(board: &str, boot_id: u32, reset: ResetReason, last_panic: &str) -> Identity {
     Identity {
         protocol_min: PROTOCOL_VERSION,
@@ -35,19 +35,19 @@ const OUTBOX: usize = 12;
 
 /// A controller with its wire.
 #[derive(Debug)]
-pub struct Node {
+pub struct ControllerNode {
     address: u8,
     identity: Identity,
-    controller: Controller,
+    controller: ArmController,
     decoder: Decoder,
     responder: Responder,
-    outbox: Deque<FrameBytes, OUTBOX>,
+    outbox: Deque<PacketBytes, OUTBOX>,
 }
 
-impl Node {
+impl ControllerNode {
     /// A controller that answers to this address. The checksum of the settings in `identity` is
     /// kept up to date here.
-    pub fn new(address: u8, identity: Identity, controller: Controller) -> Self {
+    pub fn new(address: u8, identity: Identity, controller: ArmController) -> Self {
         Self {
             address,
             identity,
@@ -59,7 +59,7 @@ impl Node {
     }
 
     /// The controller behind the wire.
-    pub fn controller(&self) -> &Controller {
+    pub fn controller(&self) -> &ArmController {
         &self.controller
     }
 
@@ -88,8 +88,8 @@ impl Node {
         self.collect_events();
     }
 
-    /// The next frame for the wire.
-    pub fn take_frame(&mut self) -> Option<FrameBytes> {
+    /// The next packet for the wire.
+    pub fn take_packet(&mut self) -> Option<PacketBytes> {
         self.outbox.pop_front()
     }
 
@@ -101,26 +101,26 @@ impl Node {
             return;
         }
         if let Ok(Message::Heartbeat) = received.message {
-            self.controller.renew_lease(now_us);
+            self.controller.restart_host_watchdog(now_us);
             return;
         }
         if let Ok(Message::Hello(hello)) = &received.message {
             self.responder.hello(hello.session);
         }
         match self.responder.sort(header.request) {
-            Arrival::Stray => return,
-            Arrival::Repeat(answer) => {
-                let again = FrameBytes::from_slice(answer).unwrap_or_default();
+            IncomingRequest::Stray => return,
+            IncomingRequest::Repeat(answer) => {
+                let again = PacketBytes::from_slice(answer).unwrap_or_default();
                 self.send(again);
                 return;
             }
-            Arrival::New => {}
+            IncomingRequest::New => {}
         }
         let answer = self.answer(received, now_us, hardware);
-        // No message of the protocol is too long for a frame.
-        if let Ok(frame) = self.responder.answer(self.address, header.request, &answer) {
-            let frame = FrameBytes::from_slice(frame).unwrap_or_default();
-            self.send(frame);
+        // No message of the protocol is too long for a packet.
+        if let Ok(packet) = self.responder.answer(self.address, header.request, &answer) {
+            let packet = PacketBytes::from_slice(packet).unwrap_or_default();
+            self.send(packet);
         }
     }
 
@@ -133,10 +133,10 @@ impl Node {
         let header = &received.header;
         if !Message::is_always_answered(header.kind) {
             if header.version != PROTOCOL_VERSION {
-                return Message::Refused(Refusal::Version);
+                return Message::Refused(RequestRefusal::Version);
             }
             if !self.responder.has_session() {
-                return Message::Refused(Refusal::NoSession);
+                return Message::Refused(RequestRefusal::NoSession);
             }
         }
         let message = match &received.message {
@@ -145,7 +145,7 @@ impl Node {
                 return Message::Identity(self.identity.clone());
             }
             Ok(message) => message,
-            Err(_) => return Message::Refused(Refusal::NotUnderstood),
+            Err(_) => return Message::Refused(RequestRefusal::NotUnderstood),
         };
         match self
             .controller
@@ -153,8 +153,8 @@ impl Node {
         {
             Ok(Message::Status(mut status)) => {
                 let counters = self.decoder.counters();
-                status.frames_good = counters.good;
-                status.frames_bad = counters.bad;
+                status.packets_good = counters.good;
+                status.packets_bad = counters.bad;
                 Message::Status(status)
             }
             Ok(answer) => answer,
@@ -162,17 +162,18 @@ impl Node {
         }
     }
 
+    #[inline(never)] // Flash: it is called in several places.
     fn collect_events(&mut self) {
         while let Some(event) = self.controller.take_event() {
-            if let Ok(frame) = encode(self.address, 0, &event) {
-                self.send(frame);
+            if let Ok(packet) = encode(self.address, 0, &event) {
+                self.send(packet);
             }
         }
     }
 
-    /// A frame that finds no room is lost: the host repeats its request, or sees a gap in the
+    /// A packet that finds no room is lost: the host repeats its request, or sees a gap in the
     /// numbers of the events.
-    fn send(&mut self, frame: FrameBytes) {
-        let _ = self.outbox.push_back(frame);
+    fn send(&mut self, packet: PacketBytes) {
+        let _ = self.outbox.push_back(packet);
     }
 }

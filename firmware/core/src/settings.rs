@@ -15,7 +15,7 @@ pub const STORED_LEN: usize = HEAD + N_SETTINGS * 8 + 4;
 
 /// The settings of both axes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct ControllerSettings {
     values: [[i32; 2]; N_SETTINGS],
 }
 
@@ -27,7 +27,7 @@ pub struct BadValue;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damaged;
 
-impl Default for Settings {
+impl Default for ControllerSettings {
     fn default() -> Self {
         Self {
             values: MEANINGS.map(|meaning| meaning.default),
@@ -35,7 +35,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl ControllerSettings {
     /// A value, in the key's unit.
     pub fn get(&self, axis: Axis, key: Key) -> i32 {
         self.values[key as usize][axis.index()]
@@ -111,7 +111,7 @@ impl Settings {
                 && get(Key::EncoderZero) < get(Key::EncoderCountsPerTurn)
                 && get(Key::HomeSlowSpeed) <= get(Key::HomeFastSpeed)
                 && get(Key::HomeFastSpeed) <= get(Key::MaxSpeed)
-                && get(Key::Deadband) <= get(Key::TriggerWindow)
+                && get(Key::InPositionWindow) <= get(Key::TriggerWindow)
                 && get(Key::TriggerWindow) <= get(Key::FollowingLimit);
             if !in_range || !consistent {
                 return Err(BadValue);
@@ -127,33 +127,40 @@ mod tests {
 
     #[test]
     fn stored_settings_come_back() {
-        let mut settings = Settings::default();
+        let mut settings = ControllerSettings::default();
         settings.set(Axis::Phi, Key::MaxSpeed, 20_000_000).unwrap();
-        settings.set(Axis::Phi, Key::Lease, 500_000).unwrap();
-        assert_eq!(settings.get(Axis::Theta, Key::Lease), 500_000);
+        settings.set(Axis::Phi, Key::HostWatchdog, 500_000).unwrap();
+        assert_eq!(settings.get(Axis::Theta, Key::HostWatchdog), 500_000);
         assert_eq!(
-            Settings::from_bytes(&settings.to_bytes()),
+            ControllerSettings::from_bytes(&settings.to_bytes()),
             Ok(settings.clone())
         );
-        assert_ne!(settings.crc(), Settings::default().crc());
+        assert_ne!(settings.crc(), ControllerSettings::default().crc());
     }
 
     #[test]
     fn any_torn_or_bent_block_is_noticed() {
-        let bytes = Settings::default().to_bytes();
+        let bytes = ControllerSettings::default().to_bytes();
         for length in 0..STORED_LEN {
-            assert_eq!(Settings::from_bytes(&bytes[..length]), Err(Damaged));
+            assert_eq!(
+                ControllerSettings::from_bytes(&bytes[..length]),
+                Err(Damaged)
+            );
         }
         for at in 0..STORED_LEN {
             let mut bent = bytes;
             bent[at] ^= 0x10;
-            assert_eq!(Settings::from_bytes(&bent), Err(Damaged), "byte {at}");
+            assert_eq!(
+                ControllerSettings::from_bytes(&bent),
+                Err(Damaged),
+                "byte {at}"
+            );
         }
     }
 
     #[test]
     fn a_block_of_older_firmware_gets_defaults_for_its_missing_keys() {
-        let mut settings = Settings::default();
+        let mut settings = ControllerSettings::default();
         settings
             .set(Axis::Theta, Key::StepsPerTurn, 288_000)
             .unwrap();
@@ -162,21 +169,21 @@ mod tests {
         older[1] = 1;
         let crc = crc32c(&older[..HEAD + 8]);
         older[HEAD + 8..].copy_from_slice(&crc.to_le_bytes());
-        assert_eq!(Settings::from_bytes(&older), Ok(settings));
+        assert_eq!(ControllerSettings::from_bytes(&older), Ok(settings));
     }
 
     #[test]
     fn values_that_make_no_sense_change_nothing() {
-        let mut settings = Settings::default();
+        let mut settings = ControllerSettings::default();
         for (key, value) in [
             (Key::MaxSpeed, 0),
             (Key::SoftMin, 91_000_000),
             (Key::HomeAngle, 0),
             (Key::TriggerWindow, 31_000),
-            (Key::Deadband, i32::MIN),
+            (Key::InPositionWindow, i32::MIN),
         ] {
             assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue));
         }
-        assert_eq!(settings, Settings::default());
+        assert_eq!(settings, ControllerSettings::default());
     }
 }

@@ -10,7 +10,7 @@ use embedded_hal::spi::SpiBus;
 
 use crate::hardware::EncoderLost;
 
-/// The encoder needs this long after a frame before it latches anew, µs.
+/// The encoder needs this long after a word before it latches anew, µs.
 const PAUSE_US: u64 = 50;
 
 /// One encoder on its SPI.
@@ -34,9 +34,9 @@ impl<S: SpiBus> SsiEncoder<S> {
     /// The position in counts. Within the encoder's pause the last one, which is not older than it.
     pub fn counts(&mut self, now_us: u64) -> Result<u32, EncoderLost> {
         if self.read_us.is_none_or(|at| now_us >= at + PAUSE_US) {
-            let mut frame = [0u8; 3];
-            let read = self.spi.read(&mut frame);
-            self.last = read.map_err(|_| EncoderLost).and_then(|()| decode(frame));
+            let mut word = [0u8; 3];
+            let read = self.spi.read(&mut word);
+            self.last = read.map_err(|_| EncoderLost).and_then(|()| decode(word));
             self.read_us = Some(now_us);
         }
         self.last
@@ -44,8 +44,8 @@ impl<S: SpiBus> SsiEncoder<S> {
 }
 
 /// A line that is cut or shorted reads all ones or all zeros, and neither is a position.
-fn decode(frame: [u8; 3]) -> Result<u32, EncoderLost> {
-    let [a, b, c] = frame.map(u32::from);
+fn decode(word: [u8; 3]) -> Result<u32, EncoderLost> {
+    let [a, b, c] = word.map(u32::from);
     let bits = a << 16 | b << 8 | c;
     let (rest, valid) = (bits >> 23 & 1, bits >> 4 & 1);
     if rest == 0 || valid == 0 || bits == 0xFF_FFFF {
@@ -62,7 +62,7 @@ mod tests {
 
     use super::*;
 
-    /// Answers with frames one after the other.
+    /// Answers with words one after the other.
     struct Line<'a>(&'a [u32]);
 
     impl ErrorType for Line<'_> {
@@ -71,9 +71,9 @@ mod tests {
 
     impl SpiBus for Line<'_> {
         fn read(&mut self, words: &mut [u8]) -> Result<(), Infallible> {
-            let (frame, rest) = self.0.split_first().unwrap();
+            let (word, rest) = self.0.split_first().unwrap();
             self.0 = rest;
-            words.copy_from_slice(&frame.to_be_bytes()[1..]);
+            words.copy_from_slice(&word.to_be_bytes()[1..]);
             Ok(())
         }
         fn write(&mut self, _: &[u8]) -> Result<(), Infallible> {
@@ -90,14 +90,14 @@ mod tests {
         }
     }
 
-    fn encoder(frames: &[u32]) -> SsiEncoder<Line<'_>> {
-        SsiEncoder::new(Line(frames))
+    fn encoder(words: &[u32]) -> SsiEncoder<Line<'_>> {
+        SsiEncoder::new(Line(words))
     }
 
     #[test]
     fn a_position_is_told_from_a_bad_one_and_from_no_encoder() {
         let good = |counts: u32| 1 << 23 | counts << 5 | 1 << 4;
-        let frames = [
+        let words = [
             good(0),
             good(0x2_5A5A),
             good(0x3_FFFF),
@@ -105,7 +105,7 @@ mod tests {
             0,
             0xFF_FFFF,
         ];
-        let mut encoder = encoder(&frames);
+        let mut encoder = encoder(&words);
         let readings = [0, 1, 2, 3, 4, 5].map(|i| encoder.counts(i * 1000));
         let lost = Err(EncoderLost);
         assert_eq!(
@@ -116,9 +116,9 @@ mod tests {
 
     #[test]
     fn within_its_pause_the_encoder_is_left_alone() {
-        let frame = |counts: u32| 1 << 23 | counts << 5 | 1 << 4;
-        let frames = [frame(5), frame(6)];
-        let mut encoder = encoder(&frames);
+        let word = |counts: u32| 1 << 23 | counts << 5 | 1 << 4;
+        let words = [word(5), word(6)];
+        let mut encoder = encoder(&words);
         assert_eq!(
             [100, 149, 150].map(|at| encoder.counts(at)),
             [Ok(5), Ok(5), Ok(6)]

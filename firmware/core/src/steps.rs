@@ -2,7 +2,7 @@
 //!
 //! A period is an interval and what happens at its end: a step, a new direction, or nothing. The
 //! timer makes the edge of a step itself, so that it comes at its time whatever the processor does;
-//! the interrupt at the end of each period only says what is to happen at the end of the next one.
+//! the interrupt at the end of each period only sets what is to happen at the end of the next one.
 //! For that the timer's reload and pulse registers are *preloaded*: what is written to them counts
 //! when the running period ends. An axis at rest plays short periods that end with nothing.
 //!
@@ -10,8 +10,8 @@
 //! period          |--- n-1 ---|----- n -----|--- n+1 ---|
 //! at its end                  step          step
 //! the interrupt               |             |
-//!   says of the running one:  pulse at end of n
-//!   says of the next one:     length of n+1
+//!   sets for the running one: pulse at end of n
+//!   sets for the next one:    length of n+1
 //! ```
 
 use heapless::spsc;
@@ -82,7 +82,7 @@ pub trait StepTimer {
 
 /// How far the steps of an axis are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Progress {
+pub struct StepProgress {
     /// Steps given so far, up minus down; it wraps.
     pub given: i32,
     /// Periods that wait.
@@ -124,10 +124,10 @@ impl<T: StepTimer> StepChannel<T> {
     }
 
     /// How far it is.
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> StepProgress {
         let waiting = self.waiting.len();
         let is_at_rest = waiting == 0 && self.running == End::Rest && self.next == End::Rest;
-        Progress {
+        StepProgress {
             given: self.given,
             waiting,
             is_playing: !is_at_rest,
@@ -250,7 +250,7 @@ mod tests {
             channel.timer().edges,
             edges.map(|(at, up)| (began + at, up))
         );
-        let at_rest = Progress {
+        let at_rest = StepProgress {
             given: 1,
             waiting: 0,
             is_playing: false,
@@ -272,9 +272,9 @@ mod tests {
             play(&mut channel, 5);
             assert_eq!(
                 channel.progress(),
-                Progress {
+                StepProgress {
                     given,
-                    ..Progress::default()
+                    ..StepProgress::default()
                 }
             );
             assert_eq!(channel.timer().edges.len(), given as usize);

@@ -1,4 +1,4 @@
-//! Settings in two sectors of flash that take turns: the old ones are there until the new ones are
+//! ControllerSettings in two sectors of flash that take turns: the old ones are there until the new ones are
 //! whole, whenever the power goes.
 //!
 //! A record: number (counts saves), length of the settings, settings, CRC-32C of all that; little
@@ -10,12 +10,12 @@ use heapless::Vec;
 use crate::hardware::NotSaved;
 use crate::settings::STORED_LEN;
 
-/// The longest stored form of settings that this firmware looks at, also those of newer firmware.
+/// The longest stored form of settings that this firmware reads, also those of newer firmware.
 pub const STORED_MAX: usize = 512;
 const HEAD: usize = 8;
 /// The longest record, in whole words, which is how flash is written.
 pub const RECORD_MAX: usize = HEAD + STORED_MAX + 4;
-/// Settings as they were stored.
+/// ControllerSettings as they were stored.
 pub type Stored = Vec<u8, STORED_MAX>;
 
 const _: () = assert!(STORED_LEN <= STORED_MAX && RECORD_MAX.is_multiple_of(4));

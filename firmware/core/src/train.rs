@@ -1,26 +1,26 @@
 //! A train of trigger pulses.
 
-use gonia_protocol::message::{Arm, Latch, MAX_PULSES, Trigger};
+use gonia_protocol::message::{Latch, MAX_PULSES, TriggerRequest, TriggerRole};
 
-/// The train that is armed, and what its pulses have latched.
+/// The train that was requested, and the latches of its pulses.
 #[derive(Debug)]
-pub struct Train {
-    arm: Arm,
+pub struct TriggerTrain {
+    wanted: TriggerRequest,
     request: u16,
     latches: heapless::Vec<Latch, MAX_PULSES>,
-    phase: Phase,
+    phase: TrainPhase,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum TrainPhase {
     Waiting,
     High { until_us: u64 },
     Low { until_us: u64 },
 }
 
-/// What a train wants done now.
+/// What is to be done for a train now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Deed {
+pub enum TrainAction {
     /// Nothing before its next due time.
     None,
     /// Latch, and raise the output.
@@ -29,21 +29,21 @@ pub enum Deed {
     Lower,
 }
 
-impl Train {
+impl TriggerTrain {
     /// An armed train; `None` if it has no pulse or one of no length.
-    pub fn new(arm: Arm, request: u16) -> Option<Self> {
-        let valid = !arm.exposures_us.is_empty() && arm.exposures_us.iter().all(|&us| us > 0);
+    pub fn new(wanted: TriggerRequest, request: u16) -> Option<Self> {
+        let valid = !wanted.exposures_us.is_empty() && wanted.exposures_us.iter().all(|&us| us > 0);
         valid.then_some(Self {
-            arm,
+            wanted,
             request,
             latches: heapless::Vec::new(),
-            phase: Phase::Waiting,
+            phase: TrainPhase::Waiting,
         })
     }
 
     /// Which end of the trigger wire this is.
-    pub fn trigger(&self) -> Trigger {
-        self.arm.trigger
+    pub fn trigger(&self) -> TriggerRole {
+        self.wanted.trigger
     }
 
     /// The request that armed it.
@@ -58,25 +58,25 @@ impl Train {
 
     /// Whether every pulse is latched and the output is low.
     pub fn is_over(&self) -> bool {
-        let high = matches!(self.phase, Phase::High { .. });
-        self.latches.len() == self.arm.exposures_us.len() && !high
+        let high = matches!(self.phase, TrainPhase::High { .. });
+        self.latches.len() == self.wanted.exposures_us.len() && !high
     }
 
     /// Whether it waits for its first pulse.
     pub fn is_waiting(&self) -> bool {
-        self.phase == Phase::Waiting && self.latches.is_empty()
+        self.phase == TrainPhase::Waiting && self.latches.is_empty()
     }
 
     /// Begins to give pulses.
     pub fn fire(&mut self, now_us: u64) {
-        self.phase = Phase::Low { until_us: now_us };
+        self.phase = TrainPhase::Low { until_us: now_us };
     }
 
     /// Keeps a latch; the exposure of its pulse begins.
     pub fn latch(&mut self, latch: Latch) {
-        let exposure = self.arm.exposures_us.get(self.latches.len());
-        if let (Trigger::Source, Some(&us)) = (self.arm.trigger, exposure) {
-            self.phase = Phase::High {
+        let exposure = self.wanted.exposures_us.get(self.latches.len());
+        if let (TriggerRole::Source, Some(&us)) = (self.wanted.trigger, exposure) {
+            self.phase = TrainPhase::High {
                 until_us: latch.time_us + u64::from(us),
             };
         }
@@ -87,26 +87,26 @@ impl Train {
     /// When [`Self::due`] has something to say, µs.
     pub fn wake_us(&self) -> u64 {
         match self.phase {
-            Phase::Waiting => u64::MAX,
-            Phase::High { until_us } | Phase::Low { until_us } => until_us,
+            TrainPhase::Waiting => u64::MAX,
+            TrainPhase::High { until_us } | TrainPhase::Low { until_us } => until_us,
         }
     }
 
     /// What is to be done at this time.
-    pub fn due(&mut self, now_us: u64) -> Deed {
+    pub fn due(&mut self, now_us: u64) -> TrainAction {
         match self.phase {
-            Phase::High { until_us } if now_us >= until_us => {
-                self.phase = if self.latches.len() == self.arm.exposures_us.len() {
-                    Phase::Waiting
+            TrainPhase::High { until_us } if now_us >= until_us => {
+                self.phase = if self.latches.len() == self.wanted.exposures_us.len() {
+                    TrainPhase::Waiting
                 } else {
-                    Phase::Low {
-                        until_us: now_us + u64::from(self.arm.gap_us),
+                    TrainPhase::Low {
+                        until_us: now_us + u64::from(self.wanted.gap_us),
                     }
                 };
-                Deed::Lower
+                TrainAction::Lower
             }
-            Phase::Low { until_us } if now_us >= until_us => Deed::Raise,
-            _ => Deed::None,
+            TrainPhase::Low { until_us } if now_us >= until_us => TrainAction::Raise,
+            _ => TrainAction::None,
         }
     }
 }

@@ -88,7 +88,8 @@ mod ptys {
     use gonia_formats::frame_exr::write_frame;
     use gonia_formats::rig_toml::read_rig;
     use gonia_rig::Role;
-    use gonia_sim::rig::{Arm, SimPort, SimRig};
+    use gonia_sim::fault::Arm;
+    use gonia_sim::rig::{SimPort, SimRig};
     use gonia_sim::scene::{Scene, SceneGeometry};
     use serialport::{SerialPort, TTYPort};
     use std::io::{ErrorKind, Read, Write};

@@ -1,7 +1,7 @@
 //! Any bytes: nothing panics, and what is accepted is a message that can be sent again.
 #![no_main]
 
-use gonia_protocol::frame::{Decoder, encode};
+use gonia_protocol::packet::{Decoder, encode};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -14,9 +14,9 @@ fuzz_target!(|bytes: &[u8]| {
             continue;
         };
         let header = received.header;
-        let frame = encode(header.node, header.request, &message).expect("it came in a frame");
+        let packet = encode(header.node, header.request, &message).expect("it came in a packet");
         let mut again = Decoder::new();
-        let twice = frame.iter().find_map(|&byte| again.push(byte));
-        assert_eq!(twice.expect("a whole frame").message, Ok(message));
+        let twice = packet.iter().find_map(|&byte| again.push(byte));
+        assert_eq!(twice.expect("a whole packet").message, Ok(message));
     }
 });

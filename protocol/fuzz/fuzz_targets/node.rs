@@ -1,14 +1,14 @@
-//! A whole controller: the fuzzer writes frames, noise, sensor readings and time. Nothing panics,
+//! A whole controller: the fuzzer writes packets, noise, sensor readings and time. Nothing panics,
 //! and no step is given before homing.
 #![no_main]
 
-use gonia_firmware::controller::Controller;
+use gonia_firmware::controller::ArmController;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::node::{Node, identity};
-use gonia_firmware::steps::{End, Period, Progress};
+use gonia_firmware::node::{ControllerNode, identity};
+use gonia_firmware::steps::{End, Period, StepProgress};
 use gonia_protocol::NODE_LIGHT;
-use gonia_protocol::frame::encode;
-use gonia_protocol::message::{Hello, Message, Move, ResetReason, Setting, State};
+use gonia_protocol::packet::encode;
+use gonia_protocol::message::{Hello, Message, Move, ResetReason, Setting, ControllerState};
 use gonia_protocol::settings::Axis;
 use libfuzzer_sys::fuzz_target;
 
@@ -22,8 +22,8 @@ impl Hardware for Pins {
     fn queue_step(&mut self, _: Axis, period: Period) {
         self.steps += u64::from(period.end() == End::Step);
     }
-    fn progress(&mut self, _: Axis) -> Progress {
-        Progress {
+    fn progress(&mut self, _: Axis) -> StepProgress {
+        StepProgress {
             given: self.steps as i32,
             waiting: usize::from(self.sensors >> 1),
             is_playing: self.sensors & 0x80 != 0,
@@ -57,7 +57,7 @@ impl Hardware for Pins {
 fuzz_target!(|bytes: &[u8]| {
     let identity = identity("fuzz", 0, ResetReason::Unknown, "");
     let mut pins = Pins::default();
-    let mut node = Node::new(NODE_LIGHT, identity, Controller::new(0, None));
+    let mut node = ControllerNode::new(NODE_LIGHT, identity, ArmController::new(0, None));
     let (mut now_us, mut request) = (0u64, 0u16);
     let mut may_move = false;
     for chunk in bytes.chunks(6) {
@@ -101,7 +101,7 @@ fuzz_target!(|bytes: &[u8]| {
                 while node.wake_us() <= until_us {
                     now_us = now_us.max(node.wake_us());
                     node.poll(now_us, &mut pins);
-                    while node.take_frame().is_some() {}
+                    while node.take_packet().is_some() {}
                 }
                 now_us = until_us;
                 continue;
@@ -109,12 +109,12 @@ fuzz_target!(|bytes: &[u8]| {
         };
         may_move |= matches!(message, Message::Home);
         request = request.wrapping_add(1).max(1);
-        let frame = encode(NODE_LIGHT, request, &message).expect("short");
-        for &byte in &frame {
+        let packet = encode(NODE_LIGHT, request, &message).expect("short");
+        for &byte in &packet {
             node.receive(byte, now_us, &mut pins);
         }
-        while node.take_frame().is_some() {}
+        while node.take_packet().is_some() {}
     }
     assert!(may_move || pins.steps == 0, "steps before homing");
-    assert!(may_move || node.controller().state() != State::Idle);
+    assert!(may_move || node.controller().state() != ControllerState::Idle);
 });

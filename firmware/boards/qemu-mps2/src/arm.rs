@@ -1,14 +1,14 @@
 //! The arm: real step timers in front of the simulator's motors, its encoders and switches behind.
 
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::steps::{Period, Progress};
+use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::settings::Axis;
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 
 use crate::steps;
 
 /// The simulated arm, with the board's timers for its own.
-pub struct EmulatedArm(pub Bench);
+pub struct EmulatedArm(pub SimulatedArm);
 
 impl EmulatedArm {
     /// The time at which the firmware looks at its pins: steps given by then have moved the motors.
@@ -25,7 +25,7 @@ impl Hardware for EmulatedArm {
         steps::queue(axis, period);
     }
 
-    fn progress(&mut self, axis: Axis) -> Progress {
+    fn progress(&mut self, axis: Axis) -> StepProgress {
         steps::progress(axis)
     }
 

@@ -24,11 +24,12 @@ use cortex_m_rt::{entry, exception};
 use embassy_executor::InterruptExecutor;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Instant, Timer};
-use gonia_firmware::controller::Controller;
-use gonia_firmware::node::{Node, identity};
+use gonia_firmware::board::{self, Board, Wake};
+use gonia_firmware::controller::ArmController;
+use gonia_firmware::node::{ControllerNode, identity};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::message::{Identity, ResetReason};
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 use panic_persist as _;
 use static_cell::StaticCell;
 
@@ -68,28 +69,42 @@ fn main() -> ! {
     }
 }
 
-/// The arm: bytes in, steps and bytes out, and sleep until the next of either.
+/// The arm's controller, for ever.
 #[embassy_executor::task]
 async fn run_arm() {
-    static NODE: StaticCell<Node> = StaticCell::new();
-    static ARM: StaticCell<EmulatedArm> = StaticCell::new();
-    let controller = Controller::new(now_us(), None);
-    let node = NODE.init(Node::new(NODE_LIGHT, who_it_is(), controller));
-    let arm = ARM.init(EmulatedArm(Bench::quiet_arm_near_home()));
+    static NODE: StaticCell<ControllerNode> = StaticCell::new();
+    static BOARD: StaticCell<Emulated> = StaticCell::new();
+    let controller = ArmController::new(now_us(), None);
+    let node = NODE.init(ControllerNode::new(NODE_LIGHT, who_it_is(), controller));
+    let board = BOARD.init(Emulated(EmulatedArm(SimulatedArm::quiet_arm_near_home())));
     defmt::info!("ready");
-    let mut bytes = [0; 64];
-    loop {
-        arm.set_now(now_us());
-        node.poll(now_us(), arm);
-        while let Some(frame) = node.take_frame() {
-            uart::WIRE.send(&frame);
-        }
-        let wake = Timer::at(Instant::from_micros(node.wake_us()));
-        if let Either::First(received) = select(uart::RECEIVED.read(&mut bytes), wake).await {
-            arm.set_now(now_us());
-            for &byte in &bytes[..received] {
-                node.receive(byte, now_us(), arm);
-            }
+    board::run(node, board).await
+}
+
+/// What the emulator offers to the main loop.
+struct Emulated(EmulatedArm);
+
+impl Board for Emulated {
+    type Pins = EmulatedArm;
+
+    fn now_us(&self) -> u64 {
+        now_us()
+    }
+
+    fn pins(&mut self, now_us: u64) -> &mut EmulatedArm {
+        self.0.set_now(now_us);
+        &mut self.0
+    }
+
+    async fn send(&mut self, packet: &[u8]) {
+        uart::WIRE.send(packet);
+    }
+
+    async fn sleep(&mut self, until_us: u64, bytes: &mut [u8]) -> Wake {
+        let time = Timer::at(Instant::from_micros(until_us));
+        match select(uart::RECEIVED.read(bytes), time).await {
+            Either::First(received) => Wake::Bytes(received),
+            Either::Second(()) => Wake::Time,
         }
     }
 }
@@ -102,22 +117,10 @@ fn who_it_is() -> Identity {
     };
     identity(
         "qemu-mps2",
-        next_boot_id(),
+        board::next_boot_id(),
         reset,
         last_panic.unwrap_or_default(),
     )
-}
-
-/// Counts starts since power came on, in memory that a reset leaves alone.
-fn next_boot_id() -> u32 {
-    #[unsafe(link_section = ".uninit.boots")]
-    static mut BOOTS: core::mem::MaybeUninit<u32> = core::mem::MaybeUninit::uninit();
-    // SAFETY: called once, before anybody else could; any bit pattern is a number.
-    unsafe {
-        let boots = (&raw mut BOOTS).cast::<u32>();
-        boots.write_volatile(boots.read_volatile().wrapping_add(1));
-        boots.read_volatile()
-    }
 }
 
 fn now_us() -> u64 {

@@ -10,7 +10,7 @@ use core::cell::RefCell;
 
 use critical_section::Mutex;
 use gonia_firmware::profile::TICKS_PER_US;
-use gonia_firmware::steps::{End, Period, Progress, REST_TICKS, StepChannel, StepTimer};
+use gonia_firmware::steps::{End, Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
 use gonia_protocol::settings::Axis;
 use heapless::Deque;
 
@@ -79,13 +79,13 @@ pub fn queue(axis: Axis, period: Period) {
                 timer.ideal_ticks = now_ticks;
             }
         }
-        // The firmware has asked whether there is room.
+        // The firmware queues only where there is room.
         let _ = channel.push(period);
     });
 }
 
 /// How far an axis is.
-pub fn progress(axis: Axis) -> Progress {
+pub fn progress(axis: Axis) -> StepProgress {
     critical_section::with(|cs| CHANNELS[axis.index()].borrow_ref(cs).progress())
 }
 

@@ -47,7 +47,7 @@ impl State {
     }
 
     /// Sets the alarm to the next expiry.
-    fn arm(&mut self) {
+    fn set_alarm(&mut self) {
         let mut now = self.now();
         let mut next = self.queue.next_expiration(now);
         // What expires meanwhile is woken at once.
@@ -73,7 +73,7 @@ impl Driver for BoardClock {
         critical_section::with(|cs| {
             let mut state = self.state.borrow_ref_mut(cs);
             if state.queue.schedule_wake(at, waker) {
-                state.arm();
+                state.set_alarm();
             }
         });
     }
@@ -88,5 +88,5 @@ pub fn start() {
 
 /// TIMER0 has run down.
 pub fn on_alarm() {
-    critical_section::with(|cs| CLOCK.state.borrow_ref_mut(cs).arm());
+    critical_section::with(|cs| CLOCK.state.borrow_ref_mut(cs).set_alarm());
 }

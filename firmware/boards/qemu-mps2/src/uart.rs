@@ -70,7 +70,7 @@ pub fn on_receive() {
     WIRE.clear.write(2);
     while WIRE.state.read() & RX_FULL != 0 {
         let byte = WIRE.data.read() as u8;
-        // A full pipe loses the byte; the frame's checksum notices and the host repeats.
+        // A full pipe loses the byte; the packet's checksum notices and the host repeats.
         let _ = RECEIVED.try_write(&[byte]);
     }
 }

@@ -6,7 +6,7 @@ use embassy_stm32::spi::Spi;
 use embassy_stm32::spi::mode::Master;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::ssi::SsiEncoder;
-use gonia_firmware::steps::{Period, Progress};
+use gonia_firmware::steps::{Period, StepProgress};
 use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
@@ -36,7 +36,7 @@ impl Hardware for ArmPins {
         steps::queue(axis, period);
     }
 
-    fn progress(&mut self, axis: Axis) -> Progress {
+    fn progress(&mut self, axis: Axis) -> StepProgress {
         steps::progress(axis)
     }
 

@@ -38,15 +38,16 @@ use embassy_stm32::spi::{self, MODE_2, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Ch3};
-use embassy_stm32::usart::{BufferedUart, Config as UartConfig};
+use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config as UartConfig};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, bind_interrupts, exti, interrupt, pac, peripherals, usart};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
 use embedded_io_async::{Read, Write};
-use gonia_firmware::controller::Controller;
-use gonia_firmware::node::{Node, identity};
+use gonia_firmware::board::{self, Board, Wake};
+use gonia_firmware::controller::ArmController;
+use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::ssi::SsiEncoder;
 use gonia_firmware::store::Store;
 use gonia_protocol::message::ResetReason;
@@ -88,7 +89,7 @@ async fn main(spawner: Spawner) {
     core::mem::forget(PwmPin::<TIM5, Ch1>::new(p.PA0, OutputType::PushPull));
     core::mem::forget(PwmPin::<TIM2, Ch3>::new(p.PB10, OutputType::PushPull));
     steps::start([output(p.PA9.into()), output(p.PB4.into())]);
-    let mut pins = ArmPins {
+    let pins = ArmPins {
         encoders: [SsiEncoder::new(theta), SsiEncoder::new(phi)],
         home_switches: [switch(p.PC0.into()), switch(p.PC1.into())],
         interlock: switch(p.PC2.into()),
@@ -115,37 +116,59 @@ async fn main(spawner: Spawner) {
     let Ok(uart) = uart else {
         defmt::panic!("USART2 cannot do {} baud", BAUD);
     };
-    let (mut to_host, mut from_host) = uart.split();
+    let (to_host, from_host) = uart.split();
 
-    static NODE: StaticCell<Node> = StaticCell::new();
-    let controller = Controller::new(now_us(), settings.as_deref());
+    static NODE: StaticCell<ControllerNode> = StaticCell::new();
+    let controller = ArmController::new(now_us(), settings.as_deref());
     let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
-    let identity = identity("stm32f4", next_boot_id(), reset, last_panic);
-    let node = NODE.init(Node::new(address, identity, controller));
+    let identity = identity("stm32f4", board::next_boot_id(), reset, last_panic);
+    let node = NODE.init(ControllerNode::new(address, identity, controller));
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
     defmt::info!("ready, address {}", address);
+    let mut nucleo = Nucleo {
+        pins,
+        to_host,
+        from_host,
+        watchdog,
+    };
+    board::run(node, &mut nucleo).await
+}
 
-    let mut bytes = [0; 64];
-    loop {
-        watchdog.pet();
-        node.poll(now_us(), &mut pins);
-        while let Some(frame) = node.take_frame() {
-            // The buffer holds more than the node ever has waiting: this does not wait for the wire.
-            if to_host.write_all(&frame).await.is_err() {
-                defmt::warn!("frame not sent");
-            }
+/// What the board offers to the main loop.
+struct Nucleo {
+    pins: ArmPins,
+    to_host: BufferedUartTx<'static>,
+    from_host: BufferedUartRx<'static>,
+    watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
+}
+
+impl Board for Nucleo {
+    type Pins = ArmPins;
+
+    fn now_us(&self) -> u64 {
+        now_us()
+    }
+
+    fn pins(&mut self, _: u64) -> &mut ArmPins {
+        &mut self.pins
+    }
+
+    async fn send(&mut self, packet: &[u8]) {
+        // The buffer holds more than the node ever has waiting: this does not wait for the wire.
+        if self.to_host.write_all(packet).await.is_err() {
+            defmt::warn!("packet not sent");
         }
-        let wake = Timer::at(Instant::from_micros(node.wake_us()));
-        match select3(TRIGGERED.wait(), from_host.read(&mut bytes), wake).await {
-            Either3::First(_) => node.trigger_edge(now_us(), &mut pins),
-            Either3::Second(Ok(received)) => {
-                for &byte in &bytes[..received] {
-                    node.receive(byte, now_us(), &mut pins);
-                }
-            }
-            // Noise on the line, or too much of it: the frame's checksum tells, the host repeats.
-            Either3::Second(Err(_)) | Either3::Third(()) => {}
+    }
+
+    async fn sleep(&mut self, until_us: u64, bytes: &mut [u8]) -> Wake {
+        self.watchdog.pet();
+        let time = Timer::at(Instant::from_micros(until_us));
+        match select3(TRIGGERED.wait(), self.from_host.read(bytes), time).await {
+            Either3::First(()) => Wake::TriggerEdge,
+            Either3::Second(Ok(received)) => Wake::Bytes(received),
+            // Noise on the line, or too much of it: the packet's checksum shows it, the host repeats.
+            Either3::Second(Err(_)) | Either3::Third(()) => Wake::Time,
         }
     }
 }
@@ -193,7 +216,7 @@ fn clocks() -> embassy_stm32::Config {
 fn take_reset_reason() -> ResetReason {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
-    // Power coming on sets the brown-out flag too, so it is asked first; every reset sets the pin's.
+    // Power coming on sets the brown-out flag too, so it comes first; every reset sets the pin's.
     if flags.porrstf() {
         ResetReason::PowerOn
     } else if flags.borrstf() {
@@ -206,18 +229,6 @@ fn take_reset_reason() -> ResetReason {
         ResetReason::Pin
     } else {
         ResetReason::Unknown
-    }
-}
-
-/// Counts starts, in memory that a reset leaves alone and that holds anything after power-on.
-fn next_boot_id() -> u32 {
-    #[unsafe(link_section = ".uninit.boots")]
-    static mut BOOTS: core::mem::MaybeUninit<u32> = core::mem::MaybeUninit::uninit();
-    // SAFETY: called once, before anybody else could; any bit pattern is a number.
-    unsafe {
-        let boots = (&raw mut BOOTS).cast::<u32>();
-        boots.write_volatile(boots.read_volatile().wrapping_add(1));
-        boots.read_volatile()
     }
 }
 

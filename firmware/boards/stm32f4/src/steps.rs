@@ -14,7 +14,7 @@ use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::{Ocm, Urs};
 use embassy_stm32::peripherals;
 use embassy_stm32::rcc;
-use gonia_firmware::steps::{Period, Progress, REST_TICKS, StepChannel, StepTimer};
+use gonia_firmware::steps::{Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
 use gonia_protocol::settings::Axis;
 
 /// What optocoupled drivers need between edges: 2.5 µs.
@@ -61,13 +61,13 @@ pub fn start(directions: [Output<'static>; 2]) {
 /// The main loop has a period for an axis.
 pub fn queue(axis: Axis, period: Period) {
     with_channel(axis, |channel| {
-        // The firmware has asked whether there is room.
+        // The firmware queues only where there is room.
         let _ = channel.push(period);
     });
 }
 
 /// How far an axis is.
-pub fn progress(axis: Axis) -> Progress {
+pub fn progress(axis: Axis) -> StepProgress {
     with_channel(axis, |channel| channel.progress()).unwrap_or_default()
 }
 

@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn every_value_is_a_dot_and_the_default_stands_out() {
         let row = |value: f64| MotionRow {
-            setting: "deadband",
+            setting: "in_position_window",
             unit: "deg",
             value,
             is_default: value == 0.006,

@@ -66,7 +66,7 @@ fn row(acceleration: u32, rise_ms: u32) -> JerkRow {
         acceleration,
         rise_ms,
         is_default: f64::from(acceleration) == default_of(Key::Acceleration)
-            && f64::from(rise_ms) * 1e-3 == default_of(Key::AccelerationRise),
+            && f64::from(rise_ms) * 1e-3 == default_of(Key::JerkTime),
         motion_s: mean(
             runs.iter()
                 .map(|run| run.last().map_or(0.0, |us| *us as f64 * 1e-6)),
@@ -161,16 +161,16 @@ fn settle(times_us: &[u64], config: PlantConfig) -> (f64, f64) {
     }
     let end_us = start_us + times_us.last().copied().unwrap_or(0);
     let rest_udeg = plant.true_udeg(end_us + REST_US);
-    let deadband_udeg = f64::from(Key::Deadband.default_of(Axis::Theta));
+    let window_udeg = f64::from(Key::InPositionWindow.default_of(Axis::Theta));
     let (mut left_us, mut swing) = (end_us, 0.0f64);
     for now_us in (end_us..end_us + REST_US).step_by(LOOK_US as usize) {
         let off = (plant.true_udeg(now_us) - rest_udeg).abs();
         swing = swing.max(off);
-        if off > deadband_udeg {
+        if off > window_udeg {
             left_us = now_us + LOOK_US;
         }
     }
-    let settled_s = (left_us - start_us) as f64 * 1e-6 + default_of(Key::SettleWindow);
+    let settled_s = (left_us - start_us) as f64 * 1e-6 + default_of(Key::SettlingTime);
     (settled_s, swing * 1e-6)
 }
 

@@ -1,15 +1,15 @@
 //! Bytes to messages and back.
 
 use crate::message::{BodyError, Message};
-use crate::{MAX_FRAME, PROTOCOL_VERSION, crc32c};
+use crate::{MAX_PACKET, PROTOCOL_VERSION, crc32c};
 
-/// A frame as it stands on the wire, closing zero included.
-pub type FrameBytes = heapless::Vec<u8, MAX_FRAME>;
+/// A packet as it stands on the wire, closing zero included.
+pub type PacketBytes = heapless::Vec<u8, MAX_PACKET>;
 
 const HEADER: usize = 5;
 const CHECKSUM: usize = 4;
 /// What fits between COBS' own byte and the closing zero (below 254 bytes COBS adds one).
-const MAX_CONTENT: usize = MAX_FRAME - 3;
+const MAX_CONTENT: usize = MAX_PACKET - 3;
 
 /// What stands before the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,13 +24,13 @@ pub struct Header {
     pub request: u16,
 }
 
-/// A message that is longer than a frame may be. No message of this crate is; the type is here
+/// A message that is longer than a packet may be. No message of this crate is; the type is here
 /// because a body's length is only known once it is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong;
 
-/// The frame of a message, ready for the wire.
-pub fn encode(node: u8, request: u16, message: &Message) -> Result<FrameBytes, TooLong> {
+/// The packet of a message, ready for the wire.
+pub fn encode(node: u8, request: u16, message: &Message) -> Result<PacketBytes, TooLong> {
     let mut content = [0u8; MAX_CONTENT];
     let [low, high] = request.to_le_bytes();
     content[..HEADER].copy_from_slice(&[PROTOCOL_VERSION, message.kind(), node, low, high]);
@@ -39,16 +39,16 @@ pub fn encode(node: u8, request: u16, message: &Message) -> Result<FrameBytes, T
     let checksum = crc32c(&content[..end]).to_le_bytes();
     content[end..end + CHECKSUM].copy_from_slice(&checksum);
 
-    let mut frame = FrameBytes::new();
-    frame.resize_default(MAX_FRAME).map_err(|_| TooLong)?;
-    let length = cobs::try_encode(&content[..end + CHECKSUM], &mut frame[..MAX_FRAME - 1])
+    let mut packet = PacketBytes::new();
+    packet.resize_default(MAX_PACKET).map_err(|_| TooLong)?;
+    let length = cobs::try_encode(&content[..end + CHECKSUM], &mut packet[..MAX_PACKET - 1])
         .map_err(|_| TooLong)?;
-    frame[length] = 0;
-    frame.truncate(length + 1);
-    Ok(frame)
+    packet[length] = 0;
+    packet.truncate(length + 1);
+    Ok(packet)
 }
 
-/// A frame whose checksum is right.
+/// A packet whose checksum is right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
     /// Its header.
@@ -66,10 +66,10 @@ pub struct Counters {
     pub bad: u32,
 }
 
-/// Finds frames in a stream of bytes that may begin anywhere and lose, gain or change any of them.
+/// Finds packets in a stream of bytes that may begin anywhere and lose, gain or change any of them.
 #[derive(Debug)]
 pub struct Decoder {
-    buffer: [u8; MAX_FRAME],
+    buffer: [u8; MAX_PACKET],
     length: usize,
     overrun: bool,
     counters: Counters,
@@ -85,7 +85,7 @@ impl Decoder {
     /// A decoder at the start of a stream.
     pub const fn new() -> Self {
         Self {
-            buffer: [0; MAX_FRAME],
+            buffer: [0; MAX_PACKET],
             length: 0,
             overrun: false,
             counters: Counters { good: 0, bad: 0 },
@@ -97,11 +97,11 @@ impl Decoder {
         self.counters
     }
 
-    /// Takes one byte; returns a frame when that byte closes one.
+    /// Takes one byte; returns a packet when that byte closes one.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         if byte != 0 {
-            // The closing zero is not stored, so one byte less than a frame fits.
-            if self.length < MAX_FRAME - 1 {
+            // The closing zero is not stored, so one byte less than a packet fits.
+            if self.length < MAX_PACKET - 1 {
                 self.buffer[self.length] = byte;
                 self.length += 1;
             } else {
@@ -112,7 +112,7 @@ impl Decoder {
         let length = core::mem::take(&mut self.length);
         let overrun = core::mem::take(&mut self.overrun);
         if length == 0 {
-            // Zeros between frames: a sender may open with one to end a broken frame.
+            // Zeros between packets: a sender may open with one to end a broken packet.
             return None;
         }
         let received = if overrun {
@@ -128,7 +128,7 @@ impl Decoder {
     }
 }
 
-/// The content of one COBS block, if it is a frame.
+/// The content of one COBS block, if it is a packet.
 fn open(block: &mut [u8]) -> Option<Received> {
     let length = cobs::decode_in_place(block).ok()?;
     let content = block.get(..length)?;
@@ -157,9 +157,9 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_survives_the_way_there() {
-        let frame = encode(1, 7, &Message::Stop).unwrap();
-        let got = feed(&mut Decoder::new(), &frame);
+    fn a_packet_survives_the_way_there() {
+        let packet = encode(1, 7, &Message::Stop).unwrap();
+        let got = feed(&mut Decoder::new(), &packet);
         assert_eq!(got.len(), 1);
         assert_eq!(got[0].header.request, 7);
         assert_eq!(got[0].message, Ok(Message::Stop));
@@ -167,10 +167,10 @@ mod tests {
 
     #[test]
     fn any_single_flipped_bit_is_noticed() {
-        let frame = encode(2, 513, &Message::ReadLatch(3)).unwrap();
-        for at in 0..frame.len() {
+        let packet = encode(2, 513, &Message::ReadLatch(3)).unwrap();
+        for at in 0..packet.len() {
             for bit in 0..8 {
-                let mut bent = frame.clone();
+                let mut bent = packet.clone();
                 bent[at] ^= 1 << bit;
                 assert!(
                     feed(&mut Decoder::new(), &bent).is_empty(),
@@ -181,11 +181,11 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_begins_amid_a_frame_recovers_with_the_next() {
-        let frame = encode(1, 1, &Message::Home).unwrap();
+    fn a_stream_that_begins_amid_a_packet_recovers_with_the_next() {
+        let packet = encode(1, 1, &Message::Home).unwrap();
         let mut decoder = Decoder::new();
-        assert!(feed(&mut decoder, &frame[3..]).is_empty());
-        assert_eq!(feed(&mut decoder, &frame).len(), 1);
+        assert!(feed(&mut decoder, &packet[3..]).is_empty());
+        assert_eq!(feed(&mut decoder, &packet).len(), 1);
         assert_eq!(decoder.counters(), Counters { good: 1, bad: 1 });
     }
 

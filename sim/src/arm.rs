@@ -2,7 +2,7 @@
 
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::profile::TICKS_PER_US;
-use gonia_firmware::steps::{End, Period, Progress, REST_TICKS, StepChannel, StepTimer};
+use gonia_firmware::steps::{End, Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
 use gonia_firmware::store::{RECORD_MAX, Sectors, Store, Stored};
 use gonia_protocol::settings::{Axis, Key};
 
@@ -10,7 +10,7 @@ use crate::plant::{AxisPlant, PlantConfig};
 
 /// Pins, encoders and memory of one simulated arm.
 #[derive(Debug)]
-pub struct Bench {
+pub struct SimulatedArm {
     axes: [AxisPlant; 2],
     steps: [StepChannel<VirtualTimer>; 2],
     now_us: u64,
@@ -47,7 +47,7 @@ impl VirtualTimer {
 }
 
 impl StepTimer for VirtualTimer {
-    // The channel itself says what a period has ended with.
+    // The channel itself returns what a period has ended with.
     fn end_with_pulse(&mut self, _: bool) {}
 
     fn reload(&mut self, ticks: u32) {
@@ -93,7 +93,7 @@ struct RamFlash {
     has_died: bool,
 }
 
-impl Bench {
+impl SimulatedArm {
     /// An arm of two axes, θ and φ.
     pub fn new(configs: [PlantConfig; 2], seed: u64) -> Self {
         let [theta, phi] = configs;
@@ -134,7 +134,7 @@ impl Bench {
         Self::new(axes.map(axis), 1)
     }
 
-    /// The time at which somebody looks at the arm: whatever steps were due by then are given.
+    /// Lets the time pass up to now: the steps that were due by then are given.
     pub fn set_now(&mut self, now_us: u64) {
         self.now_us = now_us;
         for (steps, plant) in self.steps.iter_mut().zip(&mut self.axes) {
@@ -198,13 +198,13 @@ impl Bench {
     }
 }
 
-impl Hardware for Bench {
+impl Hardware for SimulatedArm {
     fn queue_step(&mut self, axis: Axis, period: Period) {
-        // The firmware has asked whether there is room.
+        // The firmware queues only where there is room.
         let _ = self.steps[axis.index()].push(period);
     }
 
-    fn progress(&mut self, axis: Axis) -> Progress {
+    fn progress(&mut self, axis: Axis) -> StepProgress {
         self.steps[axis.index()].progress()
     }
 
@@ -277,7 +277,7 @@ impl Sectors for RamFlash {
 mod tests {
     use gonia_firmware::axis::AxisDrive;
     use gonia_firmware::profile::{Profile, Ramp};
-    use gonia_firmware::settings::Settings;
+    use gonia_firmware::settings::ControllerSettings;
 
     use super::*;
 
@@ -299,8 +299,8 @@ mod tests {
         }
         assert_eq!(u64::from(fastest), 1_000_000 * TICKS_PER_US / STEPS_S);
 
-        let mut bench = Bench::default_arm(1);
-        let settings = Settings::default();
+        let mut arm = SimulatedArm::default_arm(1);
+        let settings = ControllerSettings::default();
         let mut drives = Axis::BOTH.map(|axis| AxisDrive::new(axis, &settings));
         for drive in &mut drives {
             drive.run(i64::from(steps), ramp);
@@ -308,19 +308,19 @@ mod tests {
         let mut now_us = 0;
         while drives.iter().any(AxisDrive::is_moving) {
             for drive in &mut drives {
-                drive.feed(&mut bench);
-                drive.look(&mut bench);
+                drive.feed(&mut arm);
+                drive.take_progress(&mut arm);
             }
             now_us += LATE_TICK_US;
-            bench.set_now(now_us);
+            arm.set_now(now_us);
             for drive in &mut drives {
-                drive.look(&mut bench);
+                drive.take_progress(&mut arm);
             }
         }
         let late_us = now_us - ticks / TICKS_PER_US;
         assert!(late_us < 2 * LATE_TICK_US, "{late_us}");
         for axis in Axis::BOTH {
-            assert_eq!(bench.progress(axis).given, steps as i32);
+            assert_eq!(arm.progress(axis).given, steps as i32);
         }
     }
 }
