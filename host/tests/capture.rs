@@ -387,7 +387,7 @@ fn a_second_ctrl_c_stops_moving_arms_now_and_other_settings_are_refused_afterwar
         last.lines().last().unwrap().contains("stop paused"),
         "{last}"
     );
-    // They slow down, and do not go on homing; a lease that ran out would be a fault.
+    // They slow down, and do not go on homing; a host watchdog that expired would be a fault.
     std::thread::sleep(Duration::from_secs(1));
     let status = gonia_ok(&["device", light, "status"], "");
     assert!(status.contains("state  unhomed"), "{status}");

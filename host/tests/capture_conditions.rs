@@ -10,7 +10,7 @@ use gonia::dataset::bench_setup::Thermometer;
 use gonia::dataset::{Frame, FrameRow, Rig};
 use gonia::session::{End, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
 use gonia_sim::rig::SimRig;
 use session::{begin, small_rig};
@@ -149,7 +149,7 @@ fn run_with(
 ) -> Ended {
     let session = SessionFolder::open(folder).unwrap();
     let rig = session.rig().clone();
-    let arms = [(); 2].map(|()| Bench::quiet_arm_near_home());
+    let arms = [(); 2].map(|()| SimulatedArm::quiet_arm_near_home());
     let sim = SimRig::with_arms(1, faults, arms);
     let mut arms = Arms::connect(
         Box::new(sim.port(Arm::Light)),

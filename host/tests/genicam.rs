@@ -19,7 +19,7 @@ use gonia::dataset::{Rig, Role};
 use gonia::session::{End, SessionFolder, SessionWriter, verify};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction};
-use gonia_sim::bench::Bench;
+use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::rig::SimRig;
 use session::{begin, small_rig};
@@ -67,7 +67,7 @@ fn setup() -> Genicam {
 }
 
 fn arms() -> SimRig {
-    let arms = [(); 2].map(|()| Bench::quiet_arm_near_home());
+    let arms = [(); 2].map(|()| SimulatedArm::quiet_arm_near_home());
     SimRig::with_arms(1, FaultPlan::default(), arms)
 }
 

@@ -2,7 +2,9 @@
 
 use gonia_brdf::Pose;
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{Arm, MAX_PULSES, Outcome, Refusal, State, Trigger};
+use gonia_protocol::message::{
+    ControllerState, MAX_PULSES, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
+};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
@@ -190,8 +192,8 @@ impl Arms {
         let outcomes = self.wait_for(tickets, HOMING_LIMIT_US)?;
         for (i, outcome) in outcomes.into_iter().enumerate() {
             match outcome {
-                None | Some(Outcome::Done) => {}
-                Some(Outcome::Failed(code)) => {
+                None | Some(RequestOutcome::Done) => {}
+                Some(RequestOutcome::Failed(code)) => {
                     return Err(HomeError::Fault(self.both()[i].name().to_owned(), code));
                 }
                 Some(_) => return Err(HomeError::Stopped(self.both()[i].name().to_owned())),
@@ -280,7 +282,7 @@ impl Arms {
         }
         self.at_udeg = targets_udeg;
         for outcome in self.wait_for(tickets, MOVE_LIMIT_US)?.into_iter().flatten() {
-            if outcome != Outcome::Done {
+            if outcome != RequestOutcome::Done {
                 return Ok(Some(ended_badly("a move", outcome)));
             }
         }
@@ -292,13 +294,13 @@ impl Arms {
         let exposures_us: heapless::Vec<u32, MAX_PULSES> =
             self.options.exposures_us.iter().copied().collect();
         let pulses = exposures_us.len() as u8;
-        let arm = |trigger| Arm {
+        let arm = |trigger| TriggerRequest {
             trigger,
             exposures_us: exposures_us.clone(),
             gap_us: self.options.gap_us,
         };
-        let (follower, source) = (arm(Trigger::Follower), arm(Trigger::Source));
-        let following = self.light.arm(follower)?;
+        let (follower, source) = (arm(TriggerRole::Follower), arm(TriggerRole::Source));
+        let following = self.light.request_trigger(follower)?;
         let length_us: u64 = self
             .options
             .exposures_us
@@ -306,10 +308,13 @@ impl Arms {
             .map(|&us| u64::from(us))
             .sum();
         let limit_us = length_us + 8 * u64::from(self.options.gap_us) + 1_000_000;
-        let fired = self.camera.arm(source).and_then(|_| self.camera.fire());
+        let fired = self
+            .camera
+            .request_trigger(source)
+            .and_then(|_| self.camera.fire());
         let given = fired.and_then(|ticket| self.wait_for([None, Some(ticket)], limit_us));
         match given {
-            Ok([_, Some(Outcome::Done)]) => {}
+            Ok([_, Some(RequestOutcome::Done)]) => {}
             Ok([_, outcome]) => {
                 self.disarm()?;
                 return Ok(outcome.map_or(Try::Again("no trigger".into()), |outcome| {
@@ -322,7 +327,7 @@ impl Arms {
             }
         }
         match self.light.wait(following, FOLLOWER_LIMIT_US) {
-            Ok(completed) if completed.outcome == Outcome::Done => {}
+            Ok(completed) if completed.outcome == RequestOutcome::Done => {}
             Ok(completed) => return Ok(ended_badly("the trigger", completed.outcome)),
             Err(LinkError::Endless { .. }) => {
                 self.disarm()?;
@@ -349,7 +354,7 @@ impl Arms {
 
     /// Brings both controllers back after a fault, a restart or a lost cable: hello, clear, home
     /// where needed.
-    /// What may pass, such as another fault on the way home, is got over too, a few times.
+    /// What may pass, such as another fault on the way home, is recovered automatically too, a few times.
     pub(super) fn recover(&mut self) -> Result<(), HomeError> {
         let mut tries_left = RECOVERIES;
         loop {
@@ -382,10 +387,12 @@ impl Arms {
             controller.stop()?;
             loop {
                 match controller.status()?.state {
-                    State::EStop => return Err(HomeError::Stopped(controller.name().to_owned())),
-                    State::Fault(code) => match controller.clear_fault() {
+                    ControllerState::EStop => {
+                        return Err(HomeError::Stopped(controller.name().to_owned()));
+                    }
+                    ControllerState::Fault(code) => match controller.clear_fault() {
                         Err(LinkError::Refused {
-                            refusal: Refusal::State(_),
+                            refusal: RequestRefusal::State(_),
                             ..
                         }) => {}
                         Err(LinkError::Refused { .. }) => {
@@ -393,7 +400,7 @@ impl Arms {
                         }
                         other => other?,
                     },
-                    State::Idle | State::Unhomed => break,
+                    ControllerState::Idle | ControllerState::Unhomed => break,
                     _ => {}
                 }
                 if controller.now_us() > deadline_us {
@@ -415,7 +422,7 @@ impl Arms {
     }
 
     /// Where the arms are, or rather the nearest places that they may be sent to: an arm parks at its
-    /// lowest angle, give or take the deadband.
+    /// lowest angle, give or take the in-position window.
     fn positions_udeg(&mut self) -> Result<[[i32; 2]; 2], LinkError> {
         let mut at = [[0; 2]; 2];
         for (controller, at) in self.both().into_iter().zip(&mut at) {
@@ -431,12 +438,12 @@ impl Arms {
         Ok(at)
     }
 
-    /// Waits for both arms, and keeps the lease of the one that is not being listened to.
+    /// Waits for both arms, and restarts the host watchdog of the one that is not being listened to.
     fn wait_for(
         &mut self,
         tickets: [Option<Ticket>; 2],
         limit_us: u64,
-    ) -> Result<[Option<Outcome>; 2], LinkError> {
+    ) -> Result<[Option<RequestOutcome>; 2], LinkError> {
         let deadline_us = self.now_us() + limit_us;
         let mut outcomes = [None; 2];
         for i in 0..2 {
@@ -496,13 +503,14 @@ impl HomeError {
                     | FaultCode::ENCODER_JUMP
                     | FaultCode::FOLLOWING_ERROR
                     | FaultCode::NOT_REACHED
-                    | FaultCode::LEASE_EXPIRED
-                    | FaultCode::STEPS_DISAGREE
+                    | FaultCode::HOST_WATCHDOG
+                    | FaultCode::STEP_LOSS
                     | FaultCode::HOME_MISMATCH
             ),
             HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
                 refusal,
-                Refusal::NoSession | Refusal::State(State::Fault(_) | State::Boot)
+                RequestRefusal::NoSession
+                    | RequestRefusal::State(ControllerState::Fault(_) | ControllerState::Boot)
             ),
             HomeError::Link(error) => matches!(
                 error,
@@ -513,14 +521,14 @@ impl HomeError {
     }
 }
 
-fn ended_badly(what: &str, outcome: Outcome) -> Try {
+fn ended_badly(what: &str, outcome: RequestOutcome) -> Try {
     match outcome {
-        Outcome::Failed(code) => Try::Broken(format!("{what} ended in {code}")),
-        Outcome::LeftWindow(axis) => {
+        RequestOutcome::Failed(code) => Try::Broken(format!("{what} ended in {code}")),
+        RequestOutcome::LeftWindow(axis) => {
             Try::Again(format!("{axis:?} left its window during the exposure"))
         }
-        Outcome::Stopped => Try::Broken(format!("{what} was stopped")),
-        Outcome::Done => Try::Again(format!("{what} ended early")),
+        RequestOutcome::Stopped => Try::Broken(format!("{what} was stopped")),
+        RequestOutcome::Done => Try::Again(format!("{what} ended early")),
     }
 }
 

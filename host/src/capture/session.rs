@@ -2,7 +2,7 @@
 
 use gonia_brdf::Pose;
 use gonia_brdf::direction::{Direction, angle_between};
-use gonia_protocol::message::{Refusal, State};
+use gonia_protocol::message::{ControllerState, RequestRefusal};
 use std::time::{Duration, Instant};
 
 use super::arms::{Arms, HomeError, Latched, Try};
@@ -47,7 +47,7 @@ pub struct SessionSummary {
     pub refused: usize,
     /// Shots taken again.
     pub retakes: u32,
-    /// Faults, restarts and lost cables that were got over.
+    /// Faults, restarts and lost cables from which it recovered automatically.
     pub recoveries: u32,
     /// The largest pointing error of the kept shots, degrees.
     pub max_pointing_error_deg: f64,
@@ -248,7 +248,7 @@ impl<'a> Shooter<'a> {
                     self.arms.must_home |= matches!(
                         &error,
                         LinkError::Refused {
-                            refusal: Refusal::StartBeyondLimit(_),
+                            refusal: RequestRefusal::StartBeyondLimit(_),
                             ..
                         }
                     );
@@ -316,18 +316,18 @@ impl<'a> Shooter<'a> {
 fn sort_error(index: usize, error: LinkError) -> Result<Try, SessionError> {
     match &error {
         LinkError::Refused { refusal, .. } => match refusal {
-            Refusal::TargetBeyondLimit(_) => Err(SessionError::OutOfReach {
+            RequestRefusal::TargetBeyondLimit(_) => Err(SessionError::OutOfReach {
                 index,
                 reason: error.to_string(),
             }),
-            Refusal::OutsideWindow(..) => Ok(Try::Again(error.to_string())),
-            Refusal::NoSession
-            | Refusal::NotHomed
-            | Refusal::NoSuchPulse
-            | Refusal::StartBeyondLimit(_)
-            | Refusal::State(State::Fault(_) | State::EStop | State::Unhomed) => {
-                Ok(Try::Broken(error.to_string()))
-            }
+            RequestRefusal::OutsideWindow(..) => Ok(Try::Again(error.to_string())),
+            RequestRefusal::NoSession
+            | RequestRefusal::NotHomed
+            | RequestRefusal::NoSuchPulse
+            | RequestRefusal::StartBeyondLimit(_)
+            | RequestRefusal::State(
+                ControllerState::Fault(_) | ControllerState::EStop | ControllerState::Unhomed,
+            ) => Ok(Try::Broken(error.to_string())),
             _ => Err(SessionError::Arms {
                 index,
                 source: error.into(),

@@ -18,7 +18,7 @@ pub const SETTLE_TIME_S: f64 = 0.25;
 pub fn move_time_s(axis: Axis, from_deg: f64, to_deg: f64) -> f64 {
     let value = |key: Key| f64::from(key.default_of(axis)) * 1e-6;
     let (speed, acceleration) = (value(Key::MaxSpeed), value(Key::Acceleration));
-    let rise = value(Key::AccelerationRise);
+    let rise = value(Key::JerkTime);
     let run = |way: f64| {
         if way <= 0.0 {
             0.0

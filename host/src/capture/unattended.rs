@@ -1,4 +1,4 @@
-//! A session that runs by itself for a day: what can be got over is got over, and what cannot ends
+//! A session that runs by itself for a day: what can be recovered is recovered automatically, and what cannot ends
 //! it in good order, with its reason in the journal.
 
 use super::accounts::{Accounts, Halt};

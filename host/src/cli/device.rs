@@ -7,7 +7,7 @@ use crate::link::{
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
 use gonia_protocol::NODE_ANY;
-use gonia_protocol::message::{Outcome, State};
+use gonia_protocol::message::{ControllerState, RequestOutcome};
 use gonia_protocol::settings::{Axis, MEANINGS, Meaning};
 use std::io::{BufRead, IsTerminal, Write};
 
@@ -235,7 +235,7 @@ fn status(arm: &mut Controller) -> Result<()> {
         "wire".into(),
         format!(
             "{} frames good, {} bent",
-            status.frames_good, status.frames_bad
+            status.packets_good, status.packets_bad
         ),
     ));
     table::print(&rows);
@@ -288,8 +288,8 @@ fn follow(arm: &mut Controller, ticket: Ticket, what: &str) -> Result<()> {
         };
         print_place(arm)?;
         return match completed.outcome {
-            Outcome::Done => Ok(()),
-            Outcome::Failed(code) => bail!("{what} ended in {code}"),
+            RequestOutcome::Done => Ok(()),
+            RequestOutcome::Failed(code) => bail!("{what} ended in {code}"),
             outcome => bail!("{what} ended: {outcome:?}"),
         };
     }
@@ -402,17 +402,17 @@ fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -
             "the stands do not tell: let them lie at four or more phases of worm_turn".into(),
         )),
     }
-    let limit = deg(f64::from(found.steps_disagree_udeg) * 1e-6);
-    rows.push(("steps_disagree".into(), limit));
+    let limit = deg(f64::from(found.step_loss_limit_udeg) * 1e-6);
+    rows.push(("step_loss_limit".into(), limit));
     rows.push(("next".into(), "`save` keeps it".into()));
     table::print(&rows);
     Ok(())
 }
 
-fn state_in_words(state: State) -> String {
+fn state_in_words(state: ControllerState) -> String {
     match state {
-        State::Fault(code) => code.to_string(),
-        State::EStop => "emergency stop".into(),
+        ControllerState::Fault(code) => code.to_string(),
+        ControllerState::EStop => "emergency stop".into(),
         other => format!("{other:?}").to_lowercase(),
     }
 }

@@ -88,7 +88,8 @@ mod ptys {
     use anyhow::{Context, bail};
     use gonia_brdf::Pose;
     use gonia_brdf::model::Kurt;
-    use gonia_sim::rig::{Arm, SimPort, SimRig};
+    use gonia_sim::fault::Arm;
+    use gonia_sim::rig::{SimPort, SimRig};
     use gonia_sim::scene::Scene;
     use serialport::{SerialPort, TTYPort};
     use std::io::{ErrorKind, Read, Write};

@@ -1,6 +1,6 @@
 //! Calibrates one axis, its encoder and its gear, against a reference, at the bench.
 
-use gonia_protocol::message::Outcome;
+use gonia_protocol::message::RequestOutcome;
 use gonia_protocol::settings::{Axis, Key};
 
 use super::error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
@@ -18,7 +18,7 @@ const WIDE_UDEG: i32 = 1_000_000;
 const REGULAR_GEAR_DEG: f64 = 0.0015;
 /// How far steps and encoder may disagree on an axis with such a gear and such an encoder, µdeg: what
 /// is left of both, at home and at the pose, is half of it.
-const STEPS_DISAGREE_UDEG: i32 = 10_000;
+const STEP_LOSS_LIMIT_UDEG: i32 = 10_000;
 
 /// What a calibration has found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Calibration {
     /// The gear's over a turn of the worm; `None` where the stands do not tell.
     pub gear: Option<GearMapFit>,
     /// How far steps and encoder may disagree at rest from now on, µdeg.
-    pub steps_disagree_udeg: i32,
+    pub step_loss_limit_udeg: i32,
 }
 
 /// Why an axis was not calibrated. Its old settings are in use again after a restart.
@@ -48,7 +48,7 @@ pub enum CalibrateError {
         /// What it did.
         what: &'static str,
         /// How it ended.
-        outcome: Outcome,
+        outcome: RequestOutcome,
     },
     /// The reference was not read.
     #[error("no reading of the reference: {0}")]
@@ -58,7 +58,7 @@ pub enum CalibrateError {
 /// Visits `stands_udeg` of an axis without an error map, asks `reference` at each where the axis
 /// truly is (degrees; it is told where the encoder says), fits a map, sets it, and homes again.
 /// With `is_absolute` the reference's zero becomes the axis's; else only the shape is taken from it.
-/// The same readings tell the gear's error, without which `steps_disagree` cannot be narrow. The
+/// The same readings tell the gear's error, without which `step_loss_limit` cannot be narrow. The
 /// settings are in use, not yet saved.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn calibrate_axis(
 ) -> Result<Calibration, CalibrateError> {
     // Of both axes: the other one may not be calibrated yet, and homing homes both.
     let mut guards = Vec::new();
-    for key in [Key::HomeTolerance, Key::StepsDisagree] {
+    for key in [Key::HomeTolerance, Key::StepLossLimit] {
         for axis in Axis::BOTH {
             guards.push((axis, key, arm.setting(axis, key)?));
             arm.set_setting(axis, key, WIDE_UDEG)?;
@@ -128,18 +128,18 @@ pub fn calibrate_axis(
     for (axis, key, value) in guards {
         arm.set_setting(axis, key, value)?;
     }
-    let before_udeg = arm.setting(axis, Key::StepsDisagree)?;
-    let steps_disagree_udeg = match gear {
+    let before_udeg = arm.setting(axis, Key::StepLossLimit)?;
+    let step_loss_limit_udeg = match gear {
         Some(gear) if gear.rms_after_deg <= REGULAR_GEAR_DEG => {
-            STEPS_DISAGREE_UDEG.min(before_udeg)
+            STEP_LOSS_LIMIT_UDEG.min(before_udeg)
         }
-        _ => before_udeg.max(Key::StepsDisagree.default_of(axis)),
+        _ => before_udeg.max(Key::StepLossLimit.default_of(axis)),
     };
-    arm.set_setting(axis, Key::StepsDisagree, steps_disagree_udeg)?;
+    arm.set_setting(axis, Key::StepLossLimit, step_loss_limit_udeg)?;
     Ok(Calibration {
         encoder: fit,
         gear,
-        steps_disagree_udeg,
+        step_loss_limit_udeg,
     })
 }
 
@@ -167,7 +167,7 @@ fn end_well(
     what: &'static str,
 ) -> Result<(), CalibrateError> {
     match arm.wait(ticket, LIMIT_US)?.outcome {
-        Outcome::Done => Ok(()),
+        RequestOutcome::Done => Ok(()),
         outcome => Err(CalibrateError::Ended {
             arm: arm.name().to_owned(),
             what,

@@ -2,19 +2,19 @@
 
 use std::collections::VecDeque;
 
-use gonia_protocol::frame::{Decoder, encode};
-use gonia_protocol::link::{Patience, Requester, Role, Wish};
+use gonia_protocol::link::{IncomingPacket, NextAction, Requester, RetryPolicy};
 use gonia_protocol::message::{
-    Arm, Completed, Hello, Identity, Latch, LogEntry, Message, Move, Refusal, Setting, SettingName,
-    Status, Telemetry,
+    Completed, Hello, Identity, Latch, LogEntry, Message, Move, RequestRefusal, Setting,
+    SettingName, Status, Telemetry, TriggerRequest,
 };
+use gonia_protocol::packet::{Decoder, encode};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_ANY, NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
 
 use super::{LinkError, Transport};
 
-/// The lease is renewed this often while something is waited for, µs: an eighth of its
-/// default, since on a bad wire one frame in ten may be lost.
+/// The host watchdog is restarted this often while something is waited for, µs: an eighth of its
+/// default, since on a bad wire one packet in ten may be lost.
 pub const HEARTBEAT_US: u64 = 250_000;
 /// After so long without news of something accepted, the host asks: the event may be lost.
 const ASK_AFTER_US: u64 = 2_000_000;
@@ -65,7 +65,7 @@ impl Controller {
             transport,
             // A number that the controller has not heard: the µs at which this session began.
             session: now_us as u32,
-            link: Requester::new(node, 0, Patience::default()),
+            link: Requester::new(node, 0, RetryPolicy::default()),
             decoder: Decoder::new(),
             incoming: Vec::new(),
             identity: no_identity(),
@@ -141,9 +141,9 @@ impl Controller {
 
     /// Makes ready for a trigger train. The ticket ends only on a follower: when it has latched the
     /// last pulse. Latches of earlier trains are forgotten.
-    pub fn arm(&mut self, arm: Arm) -> Result<Ticket, LinkError> {
+    pub fn request_trigger(&mut self, request: TriggerRequest) -> Result<Ticket, LinkError> {
         self.latches.clear();
-        self.begin(&Message::Arm(arm), "arming the trigger")
+        self.begin(&Message::RequestTrigger(request), "the trigger request")
     }
 
     /// Starts the armed train; the ticket ends with its last pulse.
@@ -224,7 +224,7 @@ impl Controller {
         Ok(entries)
     }
 
-    /// Waits a while for something accepted to end; `None` if it has not. Renews the lease.
+    /// Waits a while for something accepted to end; `None` if it has not. Restarts the host watchdog.
     pub fn poll(
         &mut self,
         ticket: Ticket,
@@ -285,14 +285,14 @@ impl Controller {
         Ok(())
     }
 
-    /// Renews the lease, if it is time to.
+    /// Restarts the host watchdog, if it is time to.
     pub fn keep_alive(&mut self) -> Result<(), LinkError> {
         let now_us = self.now_us();
         if now_us >= self.heartbeat_us + HEARTBEAT_US {
             self.heartbeat_us = now_us;
             // Without a body no message is too long.
-            if let Ok(frame) = encode(self.link.node(), 0, &Message::Heartbeat) {
-                self.send(&frame)?;
+            if let Ok(packet) = encode(self.link.node(), 0, &Message::Heartbeat) {
+                self.send(&packet)?;
             }
         }
         Ok(())
@@ -345,31 +345,31 @@ impl Controller {
         }
     }
 
-    /// Sends a request and waits for its answer, repeating it as often as patience allows.
+    /// Sends a request and waits for its answer, repeating it as often as the retry policy allows.
     fn ask(&mut self, message: &Message, what: &'static str) -> Result<(u16, Message), LinkError> {
         if !Message::is_always_answered(message.kind()) {
             self.check_version()?;
         }
         let now_us = self.now_us();
-        let Ok((id, frame)) = self.link.begin(message, now_us) else {
+        let Ok((id, packet)) = self.link.begin(message, now_us) else {
             return Err(self.confused(what));
         };
-        let frame = frame.to_vec();
-        self.send(&frame)?;
-        // Any request renews the lease.
+        let packet = packet.to_vec();
+        self.send(&packet)?;
+        // Any request restarts the host watchdog.
         self.heartbeat_us = now_us;
         loop {
             let now_us = self.now_us();
             let wait_us = match self.link.poll(now_us) {
-                Wish::WaitUntil(due_us) => due_us - now_us,
-                Wish::Repeat(frame) => {
-                    let frame = frame.to_vec();
+                NextAction::WaitUntil(due_us) => due_us - now_us,
+                NextAction::Repeat(packet) => {
+                    let packet = packet.to_vec();
                     // The zero ends whatever a fault has left open at the other end.
                     self.send(&[0])?;
-                    self.send(&frame)?;
+                    self.send(&packet)?;
                     continue;
                 }
-                Wish::Nothing | Wish::GiveUp => {
+                NextAction::Nothing | NextAction::GiveUp => {
                     return Err(LinkError::NoAnswer {
                         arm: self.arm.clone(),
                         what,
@@ -421,20 +421,21 @@ impl Controller {
         let received = self.transport.receive(&mut bytes, timeout_us);
         let mut answer = None;
         for &byte in &bytes {
-            let Some(frame) = self.decoder.push(byte) else {
+            let Some(packet) = self.decoder.push(byte) else {
                 continue;
             };
             self.heard_us = self.transport.now_us();
-            let role = self.link.sort(&frame.header);
-            match (role, frame.message) {
-                (Role::Event, Ok(event)) => self.take_event(event),
-                (Role::Answer, message) if id == Some(frame.header.request) => {
+            let role = self.link.sort(&packet.header);
+            match (role, packet.message) {
+                (IncomingPacket::Event, Ok(event)) => self.take_event(event),
+                (IncomingPacket::Answer, message) if id == Some(packet.header.request) => {
                     if self.link.node() == NODE_ANY {
-                        self.link.set_node(frame.header.node);
-                        self.arm = name_of(frame.header.node).to_owned();
+                        self.link.set_node(packet.header.node);
+                        self.arm = name_of(packet.header.node).to_owned();
                     }
                     // A body that cannot be read is an answer too: not the one that was asked for.
-                    answer = Some(message.unwrap_or(Message::Refused(Refusal::NotUnderstood)));
+                    answer =
+                        Some(message.unwrap_or(Message::Refused(RequestRefusal::NotUnderstood)));
                 }
                 _ => {}
             }
@@ -482,7 +483,7 @@ impl Controller {
         }
     }
 
-    fn refused(&self, what: &'static str, refusal: Refusal) -> LinkError {
+    fn refused(&self, what: &'static str, refusal: RequestRefusal) -> LinkError {
         LinkError::Refused {
             arm: self.arm.clone(),
             what,

@@ -1,6 +1,6 @@
 //! What can go wrong between host and controller, each in one line.
 
-use gonia_protocol::message::Refusal;
+use gonia_protocol::message::RequestRefusal;
 
 /// Why a request failed.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +43,7 @@ pub enum LinkError {
         /// What was asked.
         what: &'static str,
         /// Why not.
-        refusal: Refusal,
+        refusal: RequestRefusal,
     },
     /// The answer makes no sense.
     #[error("{arm}: the answer to {what} is of another kind; update the firmware")]

@@ -198,7 +198,7 @@ fn jerk_panel(rows: &[JerkRow]) -> Markup {
     let curves = || rows.chunk_by(|a, b| a.acceleration == b.acceleration);
     let labels: Vec<(f64, f64, String)> = curves().filter_map(of_the_curve).collect();
     html! {
-        (plot.frame("a move until it has settled, arms of 6 to 16 Hz", "acceleration_rise (ms); 0: trapezoid", "s"))
+        (plot.frame("a move until it has settled, arms of 6 to 16 Hz", "jerk_time (ms); 0: trapezoid", "s"))
         @for rows in curves() {
             @let points: Vec<(f64, f64)> = rows.iter().map(|row| (rise_ms(row), row.settled_s)).collect();
             (plot.curve(&points))
@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn every_value_is_a_dot_and_the_default_stands_out() {
         let row = |value: f64| MotionRow {
-            setting: "deadband",
+            setting: "in_position_window",
             unit: "deg",
             value,
             is_default: value == 0.006,

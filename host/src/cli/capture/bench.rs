@@ -9,7 +9,7 @@ use crate::link::{StreamTransport, Transport};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Pose;
 use gonia_protocol::settings::{Axis, Key};
-use gonia_sim::bench::Bench as SimBench;
+use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::rig::SimRig;
 use std::path::Path;
@@ -125,7 +125,7 @@ fn genicam(_: &Rig, _: &Genicam, _: &SessionSettings) -> Result<Box<dyn Camera>>
 
 fn simulated(rig: &Rig, seed: u64, exact: bool, planned: usize, orders: &Orders) -> Result<Bench> {
     let sim = if exact {
-        let arms = [(); 2].map(|()| SimBench::quiet_arm_near_home());
+        let arms = [(); 2].map(|()| SimulatedArm::quiet_arm_near_home());
         SimRig::with_arms(seed, FaultPlan::default(), arms)
     } else {
         SimRig::new(seed, FaultPlan::default())

@@ -1,5 +1,5 @@
 //! What a limit of jerk brings: moves of one simulated axis by the firmware's own profile, from the
-//! first step until the axis has stayed within the deadband for the settle window; on arms that swing
+//! first step until the axis has stayed within the in-position window for the settling time; on arms that swing
 //! faster and slower than the one the defaults are made for, since nobody's arm is that one.
 
 use core::f64::consts::TAU;
@@ -35,7 +35,7 @@ pub struct JerkRow {
     pub is_default: bool,
     /// From the beginning to the last step, mean of [`WAYS_DEG`], s.
     pub motion_s: f64,
-    /// Until the deadband is not left again, and the settle window is over, mean of all arms, s.
+    /// Until the in-position window is not left again, and the settling time is over, mean of all arms, s.
     pub settled_s: f64,
     /// The same of the arm that takes longest.
     pub slowest_s: f64,
@@ -66,7 +66,7 @@ fn row(acceleration: u32, rise_ms: u32) -> JerkRow {
         acceleration,
         rise_ms,
         is_default: f64::from(acceleration) == default_of(Key::Acceleration)
-            && f64::from(rise_ms) * 1e-3 == default_of(Key::AccelerationRise),
+            && f64::from(rise_ms) * 1e-3 == default_of(Key::JerkTime),
         motion_s: mean(
             runs.iter()
                 .map(|run| run.last().map_or(0.0, |us| *us as f64 * 1e-6)),
@@ -161,16 +161,16 @@ fn settle(times_us: &[u64], config: PlantConfig) -> (f64, f64) {
     }
     let end_us = start_us + times_us.last().copied().unwrap_or(0);
     let rest_udeg = plant.true_udeg(end_us + REST_US);
-    let deadband_udeg = f64::from(Key::Deadband.default_of(Axis::Theta));
+    let window_udeg = f64::from(Key::InPositionWindow.default_of(Axis::Theta));
     let (mut left_us, mut swing) = (end_us, 0.0f64);
     for now_us in (end_us..end_us + REST_US).step_by(LOOK_US as usize) {
         let off = (plant.true_udeg(now_us) - rest_udeg).abs();
         swing = swing.max(off);
-        if off > deadband_udeg {
+        if off > window_udeg {
             left_us = now_us + LOOK_US;
         }
     }
-    let settled_s = (left_us - start_us) as f64 * 1e-6 + default_of(Key::SettleWindow);
+    let settled_s = (left_us - start_us) as f64 * 1e-6 + default_of(Key::SettlingTime);
     (settled_s, swing * 1e-6)
 }
 

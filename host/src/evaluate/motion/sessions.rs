@@ -25,13 +25,13 @@ pub struct Factor {
 /// What is varied.
 pub const FACTORS: [Factor; 5] = [
     Factor {
-        key: Key::SettleWindow,
+        key: Key::SettlingTime,
         unit: "ms",
         scale: 1e3,
         values: &[4.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 240.0, 400.0],
     },
     Factor {
-        key: Key::Deadband,
+        key: Key::InPositionWindow,
         unit: "deg",
         scale: 1e6,
         values: &[0.002, 0.003, 0.004, 0.006, 0.008, 0.012, 0.02, 0.03],
@@ -49,7 +49,7 @@ pub const FACTORS: [Factor; 5] = [
         values: &[15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0],
     },
     Factor {
-        key: Key::AccelerationRise,
+        key: Key::JerkTime,
         unit: "ms",
         scale: 1e3,
         values: &[0.0, 25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 200.0],
@@ -73,7 +73,7 @@ pub struct MotionRow {
     pub kept: usize,
     /// Poses given up.
     pub given_up: usize,
-    /// Faults that were got over.
+    /// Faults from which the session recovered automatically.
     pub recoveries: u32,
     /// Largest |commanded − true shaft angle| of a kept shot's four axes, degrees: the median.
     pub p50_deg: f64,
@@ -186,7 +186,7 @@ fn set(controller: &mut Controller, key: Key, setting: i32) -> Result<(), LinkEr
             let fast = Key::HomeFastSpeed.default_of(axis).min(setting);
             controller.set_setting(axis, Key::HomeFastSpeed, fast)?;
         }
-        if key == Key::Deadband {
+        if key == Key::InPositionWindow {
             // No pulse is refused that settling has allowed.
             let window = Key::TriggerWindow.default_of(axis).max(setting);
             controller.set_setting(axis, Key::TriggerWindow, window)?;
