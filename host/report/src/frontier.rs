@@ -26,7 +26,7 @@ const PANELS: [(&str, Figure); 6] = [
     ("cosine-weighted relative error, all", |p| {
         of(p, Stratum::All, |f| f.cos_error_mean)
     }),
-    ("ΔE2000, rendered sphere", |p| p.sphere_delta_e),
+    ("ΔE00, rendered sphere", |p| p.sphere_delta_e),
 ];
 
 fn of(point: &Point, stratum: Stratum, figure: fn(&StratumFigures) -> f64) -> Option<f64> {
