@@ -3,7 +3,7 @@
 
 use crate::progress::Progress;
 use anyhow::{Context, Result};
-use gonia_formats::rivals_toml::Rivals;
+use gonia_formats::baselines_toml::BaselineTable;
 use gonia_pipeline::baselines::BaselineOptions;
 use gonia_report::make_baselines;
 use gonia_rig::{Figures, Stratum};
@@ -23,7 +23,7 @@ pub fn make_and_print(
 }
 
 /// The table on standard output.
-fn print(comparison: &Rivals) {
+fn print(comparison: &BaselineTable) {
     println!(
         "{:<14} {:>11} {:>10}  {:<32}  {:<32}",
         "way", "numbers", "seconds", "against dense: int, graz, cos, ΔE", "against truth"

@@ -5,7 +5,7 @@ use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
 use gonia_formats::check_writable_beside;
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::samples::read_samples;
 use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model, five_digits, write_fit};

@@ -94,7 +94,8 @@ impl CaptureFolder {
         self.folder.join(file)
     }
 
-    /// Loads one frame of linear radiance (brackets: [`gonia_pipeline::bracket::load_bracket`]). Frames may be loaded from many threads at once.
+    /// Loads one frame of linear radiance (raw exposures are merged by
+    /// `gonia_pipeline::bracket`). Frames may be loaded from many threads at once.
     ///
     /// # Errors
     /// One line naming the file: see [`read_frame_of_size`].

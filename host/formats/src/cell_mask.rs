@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mask_comes_back_and_counts_by_elevation() {
+    fn a_mask_comes_back_and_counts_by_polar_angle() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("m.npy");
         let grid = Grid::with_step_deg(30.0).unwrap();
@@ -66,7 +66,7 @@ mod tests {
         assert_eq!(back, mask);
         assert_eq!(back.count(), 37);
         assert!((0..grid.n_cells()).all(|c| back.contains(c) == cells.contains(&c)));
-        let share = back.share_by_elevation();
+        let share = back.share_by_polar_angle();
         assert_eq!((share[0][0], share[1][2], share[2][1]), (1.0, 0.25, 0.0));
 
         let other = Grid::with_step_deg(15.0).unwrap();

@@ -101,7 +101,7 @@ impl CsvTable {
         let theta_deg: f64 = self.number(theta)?;
         if !(theta_deg > -1.0 && theta_deg < 90.0) {
             return Err(self.wrong(
-                format_args!("{} {theta_deg} is not an elevation", self.header[theta]),
+                format_args!("{} {theta_deg} is not a polar angle", self.header[theta]),
                 "give degrees from the normal, from 0 (an arm's zero may read a little less) to below 90",
             ));
         }

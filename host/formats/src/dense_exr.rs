@@ -1,28 +1,37 @@
 //! A dense BRDF as a square RGB float EXR: row = light direction, column = view direction, each
 //! counted `n_phi·iθ + iφ` (7920 × 7920 for the paper's grid).
 
-use crate::exr_planes::{ExrPlanes, Plane};
+use crate::exr_planes::{ExrPlanes, NAMES, PREFIX, Plane, SCALE};
 use crate::exr_rows::{RowReader, write_rows};
-use crate::{FileError, exr_planes};
+use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
+use crate::{FileError, error_exr, exr_planes};
 use gonia_brdf::interpolate::ByRows;
 use gonia_brdf::progress::Progress;
-use gonia_brdf::{DenseBrdf, Direction, Grid};
+use gonia_brdf::{DenseBrdf, Grid};
 use gonia_rig::{DenseFile, Scale};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What gonia's own attributes begin with in the file.
-const PREFIX: &str = "gonia.";
-/// The attribute that holds the [`Scale`].
-const SCALE: &str = "gonia.scale";
+/// OpenEXR.
+pub(super) static FORMAT: Format = Format {
+    name: "OpenEXR",
+    endings: &["exr"],
+    magic: &[0x76, 0x2f, 0x31, 0x01],
+    content: Content::Dense(DenseFormat {
+        read,
+        open,
+        write: Some(DenseWriter {
+            whole: write,
+            by_rows: write_by_rows,
+            error_bars: error_exr::write,
+        }),
+    }),
+};
 
-/// Writes a dense BRDF whole. The planes move into the writer and come back, so that the peak of
-/// memory is one image.
-///
-/// # Errors
-/// When the file cannot be written, or a name in the provenance is empty or not Latin.
-pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError> {
+/// The planes move into the writer and come back. Fails too where a name in the provenance is empty
+/// or not Latin.
+fn write(path: &Path, file: DenseFile) -> Result<DenseFile, FileError> {
     let DenseFile {
         brdf,
         scale,
@@ -30,7 +39,7 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
     } = file;
     let grid = brdf.grid();
     let side = grid.n_directions();
-    let attributes = attributes_of(scale, &provenance);
+    let attributes = exr_planes::own_attributes(scale, &provenance);
     let planes = brdf.into_planes().map(Plane::F32);
     let image = ExrPlanes {
         width: side,
@@ -48,11 +57,7 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
     })
 }
 
-/// Writes a dense BRDF whole that does not fit memory, row by row as they are made.
-///
-/// # Errors
-/// As [`write_dense`].
-pub fn write_dense_by_rows(
+fn write_by_rows(
     path: &Path,
     grid: Grid,
     rows: &ByRows<'_>,
@@ -60,88 +65,50 @@ pub fn write_dense_by_rows(
     provenance: &BTreeMap<String, String>,
     progress: &Progress<'_>,
 ) -> Result<(), FileError> {
-    let attributes = attributes_of(scale, provenance);
+    let attributes = exr_planes::own_attributes(scale, provenance);
     write_rows(path, grid.n_directions(), &attributes, |writer| {
         let cancelled = || std::io::Error::other("cancelled");
         rows.each_row(progress, &|light, row| writer.write(light, row), cancelled)
     })
 }
 
-/// A dense BRDF of which a few values are wanted: of a plain file only these are read.
-pub enum DenseLookup {
-    /// In memory.
-    Whole(DenseBrdf),
-    /// On the disk.
-    #[doc(hidden)]
-    OnDisk(OnDisk),
-}
-
 /// A plain file, open.
-pub struct OnDisk {
+struct OnDisk {
     grid: Grid,
     reader: RowReader,
     path: PathBuf,
 }
 
-impl DenseLookup {
-    /// Opens a file, or reads it.
-    ///
-    /// # Errors
-    /// As [`read_dense`].
-    pub fn open(path: &Path) -> Result<Self, FileError> {
-        let reader = RowReader::open(path)?;
-        let on_disk = reader.and_then(|reader| {
-            let grid = Grid::from_directions(reader.side())?;
-            let path = path.to_owned();
-            Some(OnDisk { grid, reader, path })
-        });
-        match on_disk {
-            Some(on_disk) => Ok(Self::OnDisk(on_disk)),
-            None => Ok(Self::Whole(read_dense(path)?.brdf)),
-        }
-    }
-
-    /// The grid.
-    pub fn grid(&self) -> Grid {
-        match self {
-            Self::Whole(brdf) => brdf.grid(),
-            Self::OnDisk(file) => file.grid,
-        }
-    }
-
-    /// See [`Grid::lookup`].
-    ///
-    /// # Errors
-    /// When the file cannot be read, or a value is NaN or infinite.
-    pub fn lookup(&mut self, light: Direction, view: Direction) -> Result<[f32; 3], FileError> {
-        match self {
-            Self::Whole(brdf) => Ok(brdf.lookup(light, view)),
-            Self::OnDisk(OnDisk { grid, reader, path }) => {
-                grid.lookup(light, view, |light, view| {
-                    let value = reader
-                        .value(light, view)
-                        .map_err(|error| FileError::reading(path, &error))?;
-                    for (channel, name) in ["R", "G", "B"].iter().enumerate() {
-                        if !value[channel].is_finite() {
-                            return Err(no_value(path, *grid, name, (light, view), value[channel]));
-                        }
-                    }
-                    Ok(value)
-                })
-            }
-        }
-    }
+/// Of a file as gonia writes it single cells can be read.
+fn open(path: &Path) -> Result<Option<Box<dyn CellReader>>, FileError> {
+    let Some(reader) = RowReader::open(path)? else {
+        return Ok(None);
+    };
+    let Some(grid) = Grid::from_directions(reader.side()) else {
+        return Ok(None);
+    };
+    let path = path.to_owned();
+    Ok(Some(Box::new(OnDisk { grid, reader, path })))
 }
 
-/// The text attributes of a file of gonia's.
-pub(super) fn attributes_of(
-    scale: Scale,
-    provenance: &BTreeMap<String, String>,
-) -> BTreeMap<String, String> {
-    let own = provenance
-        .iter()
-        .map(|(name, text)| (format!("{PREFIX}{name}"), text.clone()));
-    own.chain([(SCALE.to_owned(), scale.to_string())]).collect()
+impl CellReader for OnDisk {
+    fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    fn cell(&self, light: usize, view: usize) -> Result<[f32; 3], FileError> {
+        let value = self
+            .reader
+            .value(light, view)
+            .map_err(|error| FileError::reading(&self.path, &error))?;
+        for (channel, name) in NAMES.iter().enumerate() {
+            if !value[channel].is_finite() {
+                let place = (light, view);
+                return Err(no_value(&self.path, self.grid, name, place, value[channel]));
+            }
+        }
+        Ok(value)
+    }
 }
 
 fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, FileError> {
@@ -149,12 +116,9 @@ fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, 
         .ok_or_else(|| FileError::new(path, "its planes differ in size", "copy or make it again"))
 }
 
-/// Reads a dense BRDF, gonia's or anybody's square RGB EXR of a grid's size.
-///
-/// # Errors
-/// One line naming the file, and the cell where there is one: not an EXR, cut short, not RGB, not
-/// square or of no grid's size, or with values that are NaN or infinite.
-pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
+/// Reads gonia's or anybody's square RGB EXR of a grid's size. One that does not say its scale counts
+/// as relative.
+fn read(path: &Path) -> Result<DenseFile, FileError> {
     let (grid, planes, attributes) = match read_plain(path)? {
         Some(read) => read,
         None => read_any(path)?,
@@ -186,10 +150,10 @@ pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
 }
 
 /// The grid, the planes and the text attributes of a file.
-type Content = (Grid, [Vec<f32>; 3], BTreeMap<String, String>);
+type FileContent = (Grid, [Vec<f32>; 3], BTreeMap<String, String>);
 
 /// A file as gonia writes it, by all threads; `None` when it is another kind, or damaged.
-fn read_plain(path: &Path) -> Result<Option<Content>, FileError> {
+fn read_plain(path: &Path) -> Result<Option<FileContent>, FileError> {
     let Some(reader) = RowReader::open(path)? else {
         return Ok(None);
     };
@@ -203,7 +167,7 @@ fn read_plain(path: &Path) -> Result<Option<Content>, FileError> {
 }
 
 /// Any square RGB EXR of a grid's size.
-fn read_any(path: &Path) -> Result<Content, FileError> {
+fn read_any(path: &Path) -> Result<FileContent, FileError> {
     let no_grid = |width, height| {
         let size = format!("is {width} × {height} pixels, which no grid has");
         (
@@ -227,7 +191,7 @@ fn check_finite(path: &Path, brdf: &DenseBrdf) -> Result<(), FileError> {
     let side = grid.n_directions();
     // A row at a time without a way out: several values are looked at at once.
     let is_whole = |row: &[f32]| row.iter().fold(true, |whole, v| whole & v.is_finite());
-    for (plane, name) in brdf.planes().iter().zip(["R", "G", "B"]) {
+    for (plane, name) in brdf.planes().iter().zip(NAMES) {
         let rows = plane.par_chunks(side);
         let Some(light) = rows.position_first(|row| !is_whole(row)) else {
             continue;
@@ -265,7 +229,9 @@ fn no_value(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dense::{DenseLookup, read_dense, write_dense};
     use exr::prelude::write_rgb_file;
+    use gonia_brdf::Direction;
 
     fn dense() -> DenseBrdf {
         let grid = Grid::with_step_deg(30.0).unwrap();
@@ -287,6 +253,48 @@ mod tests {
             assert_eq!(write_dense(&path, file.clone()).unwrap(), file);
             assert_eq!(read_dense(&path).unwrap(), file);
         }
+    }
+
+    #[test]
+    fn the_same_input_gives_the_same_bytes_and_other_readers_find_every_attribute() {
+        let dir = tempfile::tempdir().unwrap();
+        let [whole, by_planes] = ["a.exr", "b.exr"].map(|name| dir.path().join(name));
+        let names = [
+            "seed", "rig", "version", "plan", "imported", "symmetry", "fit",
+        ];
+        let provenance: BTreeMap<String, String> = names
+            .iter()
+            .map(|name| ((*name).to_owned(), format!("what {name} was")))
+            .collect();
+        let file = || DenseFile {
+            brdf: dense(),
+            scale: Scale::Absolute,
+            provenance: provenance.clone(),
+        };
+        write_dense(&whole, file()).unwrap();
+        let first = std::fs::read(&whole).unwrap();
+        for _ in 0..20 {
+            write_dense(&by_planes, file()).unwrap();
+            assert!(std::fs::read(&by_planes).unwrap() == first);
+        }
+        let meta = exr::prelude::MetaData::read_from_file(&whole, true).unwrap();
+        let read = exr_planes::text_attributes(&meta.headers[0]);
+        assert_eq!(read["gonia.scale"], "absolute");
+        assert_eq!(read.len(), names.len() + 1);
+        let image = exr::prelude::read_first_rgba_layer_from_file(
+            &whole,
+            |size, _| vec![[0f32; 3]; size.area()],
+            |pixels, at, (r, g, b, _): (f32, f32, f32, f32)| {
+                let side = Grid::with_step_deg(30.0).unwrap().n_directions();
+                pixels[at.y() * side + at.x()] = [r, g, b];
+            },
+        )
+        .unwrap();
+        let pixels = image.layer_data.channel_data.pixels;
+        assert_eq!(
+            pixels[25 * dense().grid().n_directions() + 14],
+            dense().at(25, 14)
+        );
     }
 
     #[test]

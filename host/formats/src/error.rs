@@ -1,34 +1,65 @@
 //! What is wrong with a file, in one line.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::{fmt, io};
 
 /// A file that cannot be used: which one, where in it, what is wrong, and what to do about it.
 ///
-/// Its text is always a single line, `FILE, PLACE: PROBLEM; REMEDY`.
+/// Its text is always a single line, `FILE, PLACE: PROBLEM; REMEDY`. What caused it, where something
+/// did, is its [`source`](Error::source).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileError {
+    text: Box<Text>,
+    cause: Cause,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Text {
     path: PathBuf,
     place: Option<String>,
     problem: String,
     remedy: String,
 }
 
+/// The error of the system or of a library. Errors are compared by their texts alone.
+#[derive(Clone, Debug, Default)]
+struct Cause(Option<Arc<dyn Error + Send + Sync>>);
+
+impl PartialEq for Cause {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for Cause {}
+
 impl FileError {
     /// A problem with a file as a whole.
     pub fn new(path: &Path, problem: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         Self {
-            path: path.to_owned(),
-            place: None,
-            problem: one_line(&problem.to_string()),
-            remedy: one_line(&remedy.to_string()),
+            text: Box::new(Text {
+                path: path.to_owned(),
+                place: None,
+                problem: one_line(&problem.to_string()),
+                remedy: one_line(&remedy.to_string()),
+            }),
+            cause: Cause::default(),
         }
+    }
+
+    /// The same error, with what caused it.
+    #[must_use]
+    pub fn caused_by(mut self, error: impl Error + Send + Sync + 'static) -> Self {
+        self.cause = Cause(Some(Arc::new(error)));
+        self
     }
 
     /// The same error, with the place in the file ("line 3", "channel R, pixel (5, 7)").
     #[must_use]
     pub fn at(mut self, place: impl fmt::Display) -> Self {
-        self.place = Some(one_line(&place.to_string()));
+        self.text.place = Some(one_line(&place.to_string()));
         self
     }
 
@@ -40,7 +71,7 @@ impl FileError {
             io::ErrorKind::IsADirectory => "name a file, not a folder",
             _ => "check the disk and try again",
         };
-        Self::new(path, format_args!("cannot be read ({error})"), remedy)
+        Self::new(path, format_args!("cannot be read ({error})"), remedy).caused_by(copy_of(error))
     }
 
     /// A file or folder that the system would not let us write.
@@ -58,28 +89,48 @@ impl FileError {
             _ => "check the disk and try again",
         };
         Self::new(path, format_args!("cannot be written ({error})"), remedy)
+            .caused_by(copy_of(error))
     }
 
     /// The file that is wrong.
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.text.path
     }
 }
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", one_line(&self.path.display().to_string()))?;
-        if let Some(place) = &self.place {
+        let Text {
+            path,
+            place,
+            problem,
+            remedy,
+        } = &*self.text;
+        write!(f, "{}", one_line(&path.display().to_string()))?;
+        if let Some(place) = place {
             write!(f, ", {place}")?;
         }
-        write!(f, ": {}; {}", self.problem, self.remedy)
+        write!(f, ": {problem}; {remedy}")
     }
 }
 
-impl std::error::Error for FileError {}
+impl Error for FileError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        let cause = self.cause.0.as_deref()?;
+        Some(cause)
+    }
+}
 
-/// Whitespace of any kind, line breaks included, as single spaces.
-fn one_line(text: &str) -> String {
+/// An error of the system with the same code, kind and text.
+fn copy_of(error: &io::Error) -> io::Error {
+    match error.raw_os_error() {
+        Some(code) => io::Error::from_raw_os_error(code),
+        None => io::Error::new(error.kind(), error.to_string()),
+    }
+}
+
+/// A text with whitespace of any kind, line breaks included, as single spaces.
+pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -95,6 +146,22 @@ mod tests {
             error.to_string(),
             "a/b.csv, line 3: not a number; write a number"
         );
+    }
+
+    #[test]
+    fn an_error_of_the_system_is_the_source_and_does_not_count_in_comparisons() {
+        let full = io::Error::from(io::ErrorKind::StorageFull);
+        let error = FileError::writing(Path::new("x"), &full);
+        let source = error.source().unwrap().downcast_ref::<io::Error>();
+        assert_eq!(source.unwrap().kind(), io::ErrorKind::StorageFull);
+        assert!(error.to_string().contains(&full.to_string()));
+        let same = FileError::new(
+            Path::new("x"),
+            format_args!("cannot be written ({full})"),
+            "free some space or choose another disk",
+        );
+        assert_eq!(error, same);
+        assert!(same.source().is_none());
     }
 
     #[test]

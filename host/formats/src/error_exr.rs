@@ -1,7 +1,6 @@
 //! Standard errors of a dense BRDF as an EXR of the same layout: R, G and B in the unit of the
 //! values, and a channel `origin` (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated).
 
-use crate::dense_exr::attributes_of;
 use crate::exr_planes::{ExrPlanes, Plane};
 use crate::{FileError, exr_planes};
 use exr::prelude::f16;
@@ -11,11 +10,7 @@ use gonia_rig::Scale;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Writes error bars whole.
-///
-/// # Errors
-/// When the file cannot be written, or a name in the provenance is empty or not Latin.
-pub fn write_error_bars(
+pub(super) fn write(
     path: &Path,
     grid: Grid,
     bars: ErrorBars,
@@ -28,7 +23,7 @@ pub fn write_error_bars(
         height: grid.n_directions(),
         extra: Some(("origin", Plane::F16(origin.collect()))),
         planes: bars.standard_error.map(Plane::F32),
-        attributes: attributes_of(scale, provenance),
+        attributes: exr_planes::own_attributes(scale, provenance),
     };
     exr_planes::write(path, image)?;
     Ok(())
@@ -50,7 +45,7 @@ mod tests {
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("error.exr");
-        write_error_bars(&path, grid, bars, Scale::Relative, &BTreeMap::new()).unwrap();
+        write(&path, grid, bars, Scale::Relative, &BTreeMap::new()).unwrap();
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()

@@ -1,18 +1,24 @@
 //! Three planes R, G, B of an EXR file: what frames and dense BRDFs have in common.
 
+use crate::exr_header::sort_attributes;
 use crate::{FileError, write_whole};
 use exr::meta::attribute::{AttributeValue, SampleType};
 use exr::prelude::{
     AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
     MetaData, ReadChannels, ReadLayers, Text, WritableImage, f16,
 };
+use gonia_rig::Scale;
 use half::slice::HalfFloatSliceExt;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
 /// The colour channels, in the order of every `[_; 3]` of this crate.
-const NAMES: [&str; 3] = ["R", "G", "B"];
+pub(super) const NAMES: [&str; 3] = ["R", "G", "B"];
+/// What gonia's own attributes begin with in the file.
+pub(super) const PREFIX: &str = "gonia.";
+/// The attribute that holds the [`Scale`].
+pub(super) const SCALE: &str = "gonia.scale";
 
 /// Three planes of one file, row by row from the top left.
 pub(super) struct ExrPlanes {
@@ -64,7 +70,7 @@ pub(super) fn read(
     path: &Path,
     check: impl FnOnce(usize, usize) -> Result<(), (String, String)>,
 ) -> Result<ExrPlanes, FileError> {
-    let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, &error))?;
+    let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, error))?;
     let [header] = meta.headers.as_slice() else {
         return Err(FileError::new(
             path,
@@ -114,7 +120,7 @@ pub(super) fn read(
         .first_valid_layer()
         .all_attributes()
         .from_file(path)
-        .map_err(|error| unreadable(path, &error))?;
+        .map_err(|error| unreadable(path, error))?;
     let planes = take_planes(path, image.layer_data.channel_data)?;
     Ok(ExrPlanes {
         width,
@@ -150,9 +156,9 @@ pub(super) fn text_attributes(header: &exr::meta::header::Header) -> BTreeMap<St
         .collect()
 }
 
-fn unreadable(path: &Path, error: &exr::error::Error) -> FileError {
+fn unreadable(path: &Path, error: exr::error::Error) -> FileError {
     match error {
-        exr::error::Error::Io(error) => FileError::reading(path, error),
+        exr::error::Error::Io(error) => FileError::reading(path, &error),
         exr::error::Error::NotSupported(what) => FileError::new(
             path,
             format_args!("is an EXR of a kind that is not read ({what})"),
@@ -162,7 +168,8 @@ fn unreadable(path: &Path, error: &exr::error::Error) -> FileError {
             path,
             format_args!("is not an EXR, or is cut short or damaged ({error})"),
             "copy or make it again",
-        ),
+        )
+        .caused_by(error),
     }
 }
 
@@ -197,15 +204,29 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
         channels,
     ));
     write_whole(path, |file| {
-        image
-            .write()
-            .to_buffered(file)
-            .map_err(|error| match error {
-                exr::error::Error::Io(error) => error,
-                other => io::Error::other(other.to_string()),
-            })
+        image.write().to_buffered(&mut *file).map_err(to_io)?;
+        sort_attributes(file)
     })?;
     take_planes(path, image.layer_data.channel_data)
+}
+
+/// An error of the `exr` crate while a file is written.
+pub(super) fn to_io(error: exr::error::Error) -> io::Error {
+    match error {
+        exr::error::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}
+
+/// The text attributes of a file of gonia's.
+pub(super) fn own_attributes(
+    scale: Scale,
+    provenance: &BTreeMap<String, String>,
+) -> BTreeMap<String, String> {
+    let own = provenance
+        .iter()
+        .map(|(name, text)| (format!("{PREFIX}{name}"), text.clone()));
+    own.chain([(SCALE.to_owned(), scale.to_string())]).collect()
 }
 
 /// The attributes of a file, the program's name among them.

@@ -4,7 +4,9 @@
 //! Such a file is a header, a table of 8-byte offsets, and for each row its number and its length (two
 //! 4-byte integers) before the values of B, G and R, all little-endian.
 
-use crate::exr_planes::{layer_attributes, text_attributes};
+use crate::exr_header::sort_attributes;
+use crate::exr_planes::{layer_attributes, text_attributes, to_io};
+use crate::read_at::read_exact_at;
 use crate::{FileError, write_whole};
 use exr::compression::Compression;
 use exr::io::PeekRead;
@@ -16,7 +18,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -71,15 +72,12 @@ pub(super) fn write_rows(
         )
         .with_attributes(own);
     write_whole(path, |file| {
-        let exr = |error: exr::error::Error| match error {
-            exr::error::Error::Io(error) => error,
-            other => io::Error::other(other.to_string()),
-        };
-        magic_number::write(file).map_err(exr)?;
+        magic_number::write(file).map_err(to_io)?;
         let headers = [header];
-        let requirements = MetaData::validate(&headers, true).map_err(exr)?;
-        requirements.write(file).map_err(exr)?;
-        Header::write_all(&headers, file, false).map_err(exr)?;
+        let requirements = MetaData::validate(&headers, true).map_err(to_io)?;
+        requirements.write(file).map_err(to_io)?;
+        Header::write_all(&headers, file, false).map_err(to_io)?;
+        sort_attributes(file)?;
         let start = file.stream_position()? + 8 * side as u64;
         let row_bytes = ROW_HEAD + 12 * side as u64;
         for row in 0..side as u64 {
@@ -174,7 +172,7 @@ impl RowReader {
             let before = (place * self.side() + column) as u64;
             let mut bytes = [0; 4];
             let at = self.offsets[row] + ROW_HEAD + 4 * before;
-            self.file.read_exact_at(&mut bytes, at)?;
+            read_exact_at(&self.file, &mut bytes, at)?;
             value[*channel] = f32::from_le_bytes(bytes);
         }
         Ok(value)
@@ -192,7 +190,7 @@ impl RowReader {
         let in_place = rows.enumerate().map_init(
             || vec![0; ROW_HEAD as usize + 12 * side],
             |bytes, (row, ((red, green), blue))| {
-                self.file.read_exact_at(bytes, self.offsets[row])?;
+                read_exact_at(&self.file, bytes, self.offsets[row])?;
                 let (head, values) = bytes.split_at(ROW_HEAD as usize);
                 let number = i64::from(self.first) + row as i64;
                 let expected = [number as i32, 12 * side as i32].map(i32::to_le_bytes);
@@ -256,6 +254,34 @@ mod tests {
     }
 
     #[test]
+    fn rows_and_planes_give_the_same_bytes_every_time() {
+        use crate::exr_planes::{ExrPlanes, Plane};
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rows.exr");
+        let attributes: BTreeMap<String, String> = ["d", "a", "c", "b", "e", "f"]
+            .map(|name| (format!("gonia.{name}"), name.to_owned()))
+            .into();
+        let row: Vec<f32> = (0..12).map(|k| k as f32).collect();
+        let image = ExrPlanes {
+            width: 12,
+            height: 12,
+            planes: [(); 3].map(|()| Plane::F32(row.repeat(12))),
+            extra: None,
+            attributes: attributes.clone(),
+        };
+        exr_planes::write(&path, image).unwrap();
+        let planes = std::fs::read(&path).unwrap();
+        for _ in 0..20 {
+            write_rows(&path, 12, &attributes, |writer| {
+                (0..12).rev().try_for_each(|k| writer.write(k, [&row; 3]))
+            })
+            .unwrap();
+            let header = planes.len() - 12 * (16 + 12 * 12);
+            assert!(std::fs::read(&path).unwrap()[..header] == planes[..header]);
+        }
+    }
+
+    #[test]
     fn a_failed_row_leaves_no_file_and_a_cut_file_is_not_opened() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("rows.exr");
@@ -284,9 +310,9 @@ mod tests {
         .unwrap();
         let reader = RowReader::open(&path).unwrap().unwrap();
         assert!(reader.read_all().unwrap().is_some());
-        let file = File::options().write(true).open(&path).unwrap();
-        file.write_all_at(&7i32.to_le_bytes(), reader.offsets[3])
-            .unwrap();
+        let mut file = File::options().write(true).open(&path).unwrap();
+        file.seek(SeekFrom::Start(reader.offsets[3])).unwrap();
+        file.write_all(&7i32.to_le_bytes()).unwrap();
         assert!(reader.read_all().unwrap().is_none());
     }
 }

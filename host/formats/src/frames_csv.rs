@@ -27,7 +27,7 @@ const SAME_POSE_DEG: f64 = 0.03;
 /// bracket.
 ///
 /// # Errors
-/// One line naming the file and its line: a missing column, a number that is none, an elevation
+/// One line naming the file and its line: a missing column, a number that is none, a polar angle
 /// outside 0° ≤ θ < 90°, an unknown role, a frame named twice that is no bracket or whose arms
 /// moved, an exposure time that is not positive, or a path that leaves the folder.
 pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
@@ -297,15 +297,15 @@ mod tests {
         for (row, said) in [
             (
                 "1,material,90,0,0,0,a.exr",
-                "theta_i_deg 90 is not an elevation",
+                "theta_i_deg 90 is not a polar angle",
             ),
             (
                 "1,material,0,0,-1,0,a.exr",
-                "theta_v_deg -1 is not an elevation",
+                "theta_v_deg -1 is not a polar angle",
             ),
             (
                 "1,material,nan,0,0,0,a.exr",
-                "theta_i_deg NaN is not an elevation",
+                "theta_i_deg NaN is not a polar angle",
             ),
             ("1,material,0,inf,0,0,a.exr", "phi_i_deg is inf"),
             ("-1,material,0,0,0,0,a.exr", "frame \"-1\""),

@@ -3,37 +3,59 @@
 //! Every reader refuses what it cannot trust with a [`FileError`]: one line that says which file,
 //! where in it, and what to do. Every writer goes through [`write_whole`], so that no half-written
 //! file ever stands under its final name.
+//!
+//! | module | what it reads and writes |
+//! |---|---|
+//! | [`dense`] | dense BRDFs, whole, by rows or cell by cell, in any format of the table |
+//! | [`samples`] | samples, in any format of the table |
+//! | [`foreign`] | other groups' measurements, to be imported |
+//! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
+//! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`] | what a session is made by and leaves behind |
+//! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
+//! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
+//!
+//! A new format of dense BRDFs, of samples or of another group is one file that defines a `Format`
+//! (`dense_exr.rs` and `utia.rs` are examples), and one row in `table.rs`.
 
-pub mod capture_folder;
+pub mod baselines_toml;
+mod capture_folder;
 pub mod cell_mask;
 mod csv_table;
-pub mod dense_exr;
-pub mod error;
-pub mod error_exr;
+pub mod dense;
+mod dense_exr;
+mod error;
+mod error_exr;
+mod exr_header;
 mod exr_planes;
 mod exr_rows;
 pub mod fit_toml;
+pub mod foreign;
+mod format;
 pub mod frame_exr;
 pub mod frames_csv;
 pub mod masks_csv;
-pub mod merl;
-pub mod ngan;
+mod merl;
+mod ngan;
 mod npy;
 pub mod photo;
 pub mod plan_csv;
 pub mod raw_frame;
-pub mod reflectance_csv;
+mod read_at;
+mod reflectance_csv;
 pub mod rig_toml;
-pub mod rivals_toml;
+mod sample_rows;
 pub mod samples;
 mod samples_csv;
 mod samples_npy;
-pub mod summary;
+mod summary;
+mod table;
 pub mod toml_text;
-pub mod utia;
-pub mod whole_file;
+mod utia;
+mod whole_file;
 
 pub use capture_folder::CaptureFolder;
-pub use error::FileError;
-pub use summary::Summary;
+pub use error::{FileError, one_line};
+pub use summary::{
+    BinCounts, CellCounts, FileNote, FrameCounts, Pointing, PoseCounts, Refused, Stage, Summary,
+};
 pub use whole_file::{check_writable, check_writable_beside, write_whole, write_whole_bytes};

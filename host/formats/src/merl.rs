@@ -5,8 +5,10 @@
 //! Values are scaled by 1/1500, 1.15/1500 and 1.66/1500; negative ones were not measured.
 
 use crate::FileError;
+use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_brdf::Brdf;
 use gonia_brdf::direction::{Vec3, dot, normalize};
+use gonia_rig::Scale;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -16,16 +18,26 @@ const N_PHI: usize = 180;
 const PLANE: usize = N_HALF * N_DIFF * N_PHI;
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
+/// The database's format.
+pub(super) static FORMAT: Format = Format {
+    name: "MERL",
+    endings: &["binary"],
+    magic: &[90, 0, 0, 0, 90, 0, 0, 0, 180, 0, 0, 0],
+    content: Content::Foreign(ForeignFormat {
+        name: "MERL .binary",
+        content: ForeignContent::Brdf {
+            scale: Scale::Absolute,
+            read: |path| Ok(Box::new(read_merl(path)?)),
+        },
+    }),
+};
+
 /// A material of the database, 1/sr.
-pub struct Merl {
+struct Merl {
     values: Vec<f64>,
 }
 
-/// Reads a material.
-///
-/// # Errors
-/// One line naming the file: unreadable, or of another size.
-pub fn read_merl(path: &Path) -> Result<Merl, FileError> {
+fn read_merl(path: &Path) -> Result<Merl, FileError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
     let (header, rest) = bytes.split_at(bytes.len().min(12));
     let (sizes, _) = header.as_chunks::<4>();

@@ -8,6 +8,7 @@
 //! that program reads the values; no file was at hand.
 
 use crate::FileError;
+use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_brdf::Sample;
 use gonia_brdf::direction::wrap_deg;
 use std::fs::File;
@@ -18,6 +19,17 @@ const HEADER_BYTES: usize = 64;
 /// More bins along an axis than this is no measurement.
 const MOST_BINS: i32 = 10_000;
 
+/// The authors' format.
+pub(super) static FORMAT: Format = Format {
+    name: "Ngan, Durand, Matusik",
+    endings: &["dat"],
+    magic: &[],
+    content: Content::Foreign(ForeignFormat {
+        name: "Ngan, Durand and Matusik .dat",
+        content: ForeignContent::Samples { read: read_ngan },
+    }),
+};
+
 /// The numbers of bins, and how far φv − φi runs.
 struct Layout {
     bins: [usize; 4],
@@ -25,10 +37,7 @@ struct Layout {
 }
 
 /// Reads the bins that hold a measurement, each as a sample at its middle.
-///
-/// # Errors
-/// One line naming the file: unreadable, not of this kind, or of another size than it says.
-pub fn read_ngan(path: &Path) -> Result<Vec<Sample>, FileError> {
+fn read_ngan(path: &Path) -> Result<Vec<Sample>, FileError> {
     let failed = |error| FileError::reading(path, &error);
     let mut file = File::open(path).map_err(failed)?;
     let mut header = [0; HEADER_BYTES];

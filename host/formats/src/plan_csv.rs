@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// One line naming the file and its line: a missing column, an index out of order, a number that
-/// is none, or an elevation outside 0° ≤ θ < 90°.
+/// is none, or a polar angle outside 0° ≤ θ < 90°.
 pub fn read_plan_csv(path: &Path) -> Result<Vec<Pose>, FileError> {
     let mut table = CsvTable::open(path)?;
     let [index, theta_i, phi_i, theta_v, phi_v] = [

@@ -13,7 +13,7 @@ const MOST: f64 = 10.0;
 /// Reads a table. Columns are found by name.
 ///
 /// # Errors
-/// One line naming the file and its line: a missing column, no rows, an elevation outside
+/// One line naming the file and its line: a missing column, no rows, a polar angle outside
 /// 0° ≤ θ < 90°, one given twice, or a reflectance that is not above 0 and at most 10.
 pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
     let mut table = CsvTable::open(path)?;
@@ -57,14 +57,14 @@ pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
         let theta: f64 = table.number(theta_i)?;
         if !(0.0..90.0).contains(&theta) {
             return Err(table.wrong(
-                format_args!("theta_i {theta} is not an elevation"),
+                format_args!("theta_i {theta} is not a polar angle"),
                 "give degrees from the normal, from 0 to below 90",
             ));
         }
         if rows.iter().any(|row| row.0 == theta) {
             return Err(table.wrong(
                 format_args!("theta_i {theta} is there twice"),
-                "give each elevation once",
+                "give each polar angle once",
             ));
         }
         rows.push((theta, rho(&table)?));
@@ -105,7 +105,7 @@ mod tests {
         for (rows, said) in [
             ("8,.9,0,.9", "line 2: 0 is no reflectance"),
             ("8,.9,nan,.9", "NaN is no reflectance"),
-            ("90,.9,.9,.9", "theta_i 90 is not an elevation"),
+            ("90,.9,.9,.9", "theta_i 90 is not a polar angle"),
             ("8,1,1,1\n8,1,1,1", "line 3: theta_i 8 is there twice"),
             ("", "has no rows"),
         ] {

@@ -11,7 +11,7 @@ const REMEDY: &str = "docs/src/reference/files/rig.md has the keys and their uni
 ///
 /// # Errors
 /// One line naming the file and the line or key: unreadable, not TOML, an unknown, missing or
-/// mistyped key, or a value that no rig has (a distance of zero, a sample larger than its marks, a
+/// mistyped key, or a value that no rig has (a distance of zero, a sample larger than its fiducial lines, a
 /// reflectance above one).
 pub fn read_rig(path: &Path) -> Result<Rig, FileError> {
     let mut rig: Rig = toml_text::read(path, REMEDY)?;

@@ -1,13 +1,22 @@
 //! Samples as `.csv`.
 
 use crate::csv_table::CsvTable;
-use crate::samples::{COLUMNS, frame_in_file, have_frames, sample_from_row};
+use crate::format::{Content, Format, SampleFormat};
+use crate::sample_rows::{COLUMNS, frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, write_whole};
 use gonia_brdf::Sample;
 use std::io::Write;
 use std::path::Path;
 
-pub(super) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
+/// CSV with the columns' names in the first line.
+pub(super) static FORMAT: Format = Format {
+    name: "CSV",
+    endings: &["csv"],
+    magic: &[],
+    content: Content::Samples(SampleFormat { read, write }),
+};
+
+fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     let mut table = CsvTable::open(path)?;
     let mut columns = Vec::with_capacity(8);
     for name in &COLUMNS[..7] {
@@ -27,7 +36,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     Ok(samples)
 }
 
-pub(super) fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
+fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
     let with_frames = have_frames(samples);
     let columns = if with_frames { 8 } else { 7 };
     write_whole(path, |out| {
@@ -75,7 +84,7 @@ mod tests {
         );
         let error = read("1,2,3,100,20,30,40\n").unwrap_err().to_string();
         assert!(
-            error.contains("s.csv, line 2: theta_i 100 is not an elevation"),
+            error.contains("s.csv, line 2: theta_i 100 is not a polar angle"),
             "{error}"
         );
     }

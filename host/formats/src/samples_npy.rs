@@ -1,6 +1,7 @@
 //! Samples as `.npy`.
 
-use crate::samples::{frame_in_file, have_frames, sample_from_row};
+use crate::format::{Content, Format, SampleFormat};
+use crate::sample_rows::{frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, npy};
 use gonia_brdf::Sample;
 use std::io::{Read, Write};
@@ -10,7 +11,15 @@ const DTYPE: &str = "<f4";
 /// Rows read or written at a time.
 const ROWS: usize = 1 << 13;
 
-pub(super) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
+/// NumPy's array file: float32, N × 7 or N × 8, in C order.
+pub(super) static FORMAT: Format = Format {
+    name: "NumPy",
+    endings: &["npy"],
+    magic: b"\x93NUMPY",
+    content: Content::Samples(SampleFormat { read, write }),
+};
+
+fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     let mut array = npy::open(path, DTYPE, 4)?;
     let (n, columns) = match array.shape[..] {
         [n, columns @ (7 | 8)] => (n as usize, columns as usize),
@@ -45,7 +54,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     Ok(samples)
 }
 
-pub(super) fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
+fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
     let columns = if have_frames(samples) { 8 } else { 7 };
     npy::write(path, DTYPE, &[samples.len(), columns], |out| {
         let mut buffer = Vec::with_capacity(ROWS * columns * 4);
@@ -76,7 +85,7 @@ pub(super) fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
 
 #[cfg(test)]
 mod tests {
-    use crate::samples::tests::some_samples;
+    use crate::sample_rows::tests::some_samples;
     use crate::samples::{read_samples, write_samples};
 
     #[test]

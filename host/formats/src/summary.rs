@@ -134,8 +134,9 @@ pub struct BinCounts {
     pub samples: u64,
     /// Bins with at least one sample.
     pub filled: u64,
-    /// Share of bins filled by elevations, `[iθi][iθv]`, each 0 ..= 1.
-    pub share_by_elevation: Vec<Vec<f32>>,
+    /// Share of bins filled by polar angles, `[iθi][iθv]`, each 0 ..= 1.
+    #[serde(rename = "share_by_elevation")]
+    pub share_by_polar_angle: Vec<Vec<f32>>,
 }
 
 impl BinCounts {
@@ -144,7 +145,7 @@ impl BinCounts {
         Self {
             samples,
             filled: filled.count() as u64,
-            share_by_elevation: filled.share_by_elevation(),
+            share_by_polar_angle: filled.share_by_polar_angle(),
         }
     }
 }
@@ -240,7 +241,7 @@ mod tests {
             reached: 17_010,
         });
         let refused = vec![Refused {
-            reason: "no marks".into(),
+            reason: "no fiducial lines".into(),
             count: 3,
         }];
         summary.frames = Some(FrameCounts {

@@ -5,8 +5,10 @@
 //! 32 bits, known by their size, are read too.
 
 use crate::FileError;
+use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_brdf::direction::Vec3;
 use gonia_brdf::{Brdf, Direction};
+use gonia_rig::Scale;
 use std::path::Path;
 
 const N_THETA: usize = 6;
@@ -16,16 +18,26 @@ const PHI_STEP_DEG: f64 = 7.5;
 const SIDE: usize = N_THETA * N_PHI;
 const COUNT: usize = 3 * SIDE * SIDE;
 
+/// The database's format. Its values are relative.
+pub(super) static FORMAT: Format = Format {
+    name: "UTIA",
+    endings: &["bin"],
+    magic: &[],
+    content: Content::Foreign(ForeignFormat {
+        name: "UTIA .bin",
+        content: ForeignContent::Brdf {
+            scale: Scale::Relative,
+            read: |path| Ok(Box::new(read_utia(path)?)),
+        },
+    }),
+};
+
 /// A material of the database, linear between its nodes; beyond 75° it keeps the last ring's value.
-pub struct Utia {
+struct Utia {
     values: Vec<f64>,
 }
 
-/// Reads a material.
-///
-/// # Errors
-/// One line naming the file: unreadable, or of another size.
-pub fn read_utia(path: &Path) -> Result<Utia, FileError> {
+fn read_utia(path: &Path) -> Result<Utia, FileError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
     let values: Vec<f64> = if bytes.len() == 8 * COUNT {
         let (words, _) = bytes.as_chunks::<8>();

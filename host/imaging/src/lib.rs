@@ -1,25 +1,34 @@
-//! From a frame to the values at its grid points: registration by the four lines, occlusion,
-//! sampling.
+//! From a frame to the values at its grid points: merging of exposures, registration by the four
+//! fiducial lines, occlusion, sampling.
+//!
+//! | module or type | what it does |
+//! |---|---|
+//! | [`hdr`] | brackets of raw exposures to radiance and its variance |
+//! | [`Registrar`], [`Registration`] | where the target is in a frame, and where the camera must have been |
+//! | [`find_occlusion`], [`Mask`] | what hides the target |
+//! | [`SamplingGrid`], [`PointValue`], [`LeftOut`] | the medians at the grid's points |
+//! | [`IdealLight`] | the irradiance of a point light over the target |
+//! | [`rectify`] | a frame as seen from straight above, for people |
 
 pub mod hdr;
 mod hough;
-pub mod ideal_light;
+mod ideal_light;
 mod lines;
-pub mod occlusion;
+mod occlusion;
 mod patch;
 mod profile;
 mod quantiles;
 pub mod rectify;
 mod refine;
-pub mod register;
-pub mod sampling;
+mod register;
+mod sampling;
 
 pub use ideal_light::IdealLight;
-pub use occlusion::Mask;
-pub use register::{PoseOffset, Reason, Registrar, Registration, State};
+pub use occlusion::{Mask, find_occlusion};
+pub use register::{PoseOffset, Registrar, Registration, RegistrationFailure, RegistrationState};
 pub use sampling::{LeftOut, PointValue, SamplingGrid};
 
-/// Mean of the three channels: what marks and occlusions are looked for in.
+/// Mean of the three channels: what fiducial lines and occlusions are looked for in.
 fn luminance(rgb: [f32; 3]) -> f32 {
     (rgb[0] + rgb[1] + rgb[2]) * (1.0 / 3.0)
 }

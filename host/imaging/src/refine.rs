@@ -31,7 +31,7 @@ const SAME_LINE_PX: f64 = 0.8;
 const CLEARLY_BETTER: f64 = 0.2;
 
 /// Four strips with their fitted lines.
-pub struct Fit {
+pub struct LineFit {
     /// Each line, where it was found.
     pub lines: [Option<FoundLine>; 4],
     /// Standard deviation of the blur, pixels.
@@ -81,7 +81,7 @@ pub enum Starts {
 }
 
 /// Fits the lines of four strips.
-pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> Fit {
+pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> LineFit {
     let starts = [0, 1, 2, 3].map(|i| match starts {
         Starts::Predicted => {
             let line = StripLine::default();
@@ -109,7 +109,7 @@ pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> F
             break;
         }
     }
-    Fit {
+    LineFit {
         lines: [0, 1, 2, 3].map(|i| {
             let sums = &sums[i];
             is_found(sums).then(|| FoundLine {

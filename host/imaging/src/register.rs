@@ -7,7 +7,7 @@
 
 use crate::hough::{StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES};
-use crate::refine::{Fit, FoundLine, Starts, fit_lines};
+use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
 use nalgebra::{DMatrix, DVector};
@@ -72,32 +72,32 @@ pub struct Registration {
     pub blur_px: f64,
     /// How many of the four lines were found; when locked, how many were used.
     pub lines_found: usize,
-    /// Whether the marks carry this registration.
-    pub state: State,
+    /// Whether the fiducial lines carry this registration.
+    pub state: RegistrationState,
     camera: CameraModel,
 }
 
 /// Estimated true shaft angles minus the reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseOffset {
-    /// Of the camera's elevation, degrees.
+    /// Of the camera's polar angle, degrees.
     pub theta_deg: f64,
     /// Of the camera's azimuth, degrees.
     pub phi_deg: f64,
 }
 
-/// Whether a registration stands on the marks.
+/// Whether a registration stands on the fiducial lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum State {
+pub enum RegistrationState {
     /// It does.
     Locked,
     /// It is the prediction from the arms' reading.
-    FellBack(Reason),
+    FellBack(RegistrationFailure),
 }
 
-/// Why the marks could not be trusted.
+/// Why the fiducial lines could not be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Reason {
+pub enum RegistrationFailure {
     /// Too few lines stand out from their surroundings.
     #[error("only {found} of the 4 lines could be found near where the pose puts them")]
     LinesMissing {
@@ -151,8 +151,8 @@ impl Registrar {
         self
     }
 
-    /// Registers a frame taken at the given reading of the arms. Never fails: without marks it
-    /// falls back to the prediction, and says so.
+    /// Registers a frame taken at the given reading of the arms. Never fails: without fiducial
+    /// lines it falls back to the prediction, and says so.
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
         let mut solved = self.solve(frame, reading.view, &predicted);
@@ -175,7 +175,7 @@ impl Registrar {
                 residual_px: solution.scatter_px,
                 blur_px: solution.blur_px,
                 lines_found: solution.lines_found,
-                state: State::Locked,
+                state: RegistrationState::Locked,
                 camera: self.camera.clone(),
             },
             Err(failure) => Registration {
@@ -185,7 +185,7 @@ impl Registrar {
                 view: reading.view,
                 blur_px: failure.blur_px,
                 lines_found: failure.lines_found,
-                state: State::FellBack(failure.reason),
+                state: RegistrationState::FellBack(failure.reason),
                 camera: self.camera.clone(),
             },
         }
@@ -214,11 +214,11 @@ impl Registrar {
             strongest_line(frame, strip, half_width, search_px, self.hough_resolution)
         });
         self.search(view, &strips, hough).or_else(|failure| {
-            // A striped fabric may have lines of its own, stronger than the marks beside them.
+            // A striped fabric may have lines of its own, stronger than the fiducial lines beside them.
             let again = self.search(view, &strips, [None; 4]);
             again.map_err(|second| match second.reason {
                 // Hidden lines, and others where the pose has them: that says more.
-                Reason::LinesMissing { found } if found > 0 => second,
+                RegistrationFailure::LinesMissing { found } if found > 0 => second,
                 _ => failure,
             })
         })
@@ -253,7 +253,10 @@ impl Registrar {
             if found > 0 && estimate.surprise > MAX_SURPRISE {
                 return Err(Failure::new(estimate.wrong_layout(), &fit));
             }
-            return Err(Failure::new(Reason::LinesMissing { found }, &fit));
+            return Err(Failure::new(
+                RegistrationFailure::LinesMissing { found },
+                &fit,
+            ));
         }
         let estimate = self.best_estimate(view, strips, &fit.lines);
         self.settle(view, strips, fit, estimate)
@@ -264,7 +267,7 @@ impl Registrar {
         &self,
         view: Direction,
         strips: &[LineStrip; 4],
-        fit: Fit,
+        fit: LineFit,
         estimate: Estimate,
     ) -> Result<Solution, Failure> {
         let width = self.camera.size_px[0] as f64;
@@ -278,7 +281,10 @@ impl Registrar {
         let shift = estimate.shift;
         let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
         if offset_deg > MAX_OFFSET_DEG {
-            return Err(Failure::new(Reason::FarFromPose { offset_deg }, &fit));
+            return Err(Failure::new(
+                RegistrationFailure::FarFromPose { offset_deg },
+                &fit,
+            ));
         }
         let Some(homography) = self.homography(strips, &estimate.lines) else {
             return Err(Failure::new(estimate.wrong_layout(), &fit));
@@ -487,14 +493,14 @@ struct Solution {
 
 /// Why there is no solution, and what was seen nevertheless.
 struct Failure {
-    reason: Reason,
+    reason: RegistrationFailure,
     scatter_px: f64,
     blur_px: f64,
     lines_found: usize,
 }
 
 impl Failure {
-    fn new(reason: Reason, fit: &Fit) -> Self {
+    fn new(reason: RegistrationFailure, fit: &LineFit) -> Self {
         Self {
             reason,
             scatter_px: scatter(fit),
@@ -526,8 +532,8 @@ struct Trust {
 }
 
 impl Estimate {
-    fn wrong_layout(&self) -> Reason {
-        Reason::WrongLayout {
+    fn wrong_layout(&self) -> RegistrationFailure {
+        RegistrationFailure::WrongLayout {
             misfit_px: self.misfit_px,
             deviation: self.camera_deviation,
         }
@@ -544,7 +550,7 @@ fn shift_from(p: &DVector<f64>, scale: &[f64; 6]) -> CameraShift {
     }
 }
 
-fn scatter(fit: &Fit) -> f64 {
+fn scatter(fit: &LineFit) -> f64 {
     let found: Vec<f64> = fit.lines.iter().flatten().map(|l| l.scatter_px).collect();
     let sum: f64 = found.iter().map(|s| s * s).sum();
     (sum / found.len().max(1) as f64).sqrt()

@@ -71,7 +71,7 @@ fn corners_are_found_to_a_fraction_of_a_pixel_up_to_75_degrees() {
             ] {
                 let truth = Pose::from_deg([light[0], light[1], tv, pv]);
                 let (found, error) = register(&scene, which, truth, read_off(truth, 0.02));
-                assert_eq!(found.state, State::Locked, "{px} {tv} {pv}");
+                assert_eq!(found.state, RegistrationState::Locked, "{px} {tv} {pv}");
                 assert!(found.residual_px < 0.05, "{}", found.residual_px);
                 squares.push(error * error);
             }
@@ -112,7 +112,7 @@ fn a_rig_known_badly_is_still_registered_or_refused_never_mistaken() {
             let truth = Pose::from_deg([30.0, 140.0, tv, pv]);
             for which in [Role::Material, Role::Reference] {
                 let (found, error) = register(&scene, which, truth, read_off(truth, off));
-                if found.state == State::Locked {
+                if found.state == RegistrationState::Locked {
                     locked += 1;
                     assert!(error < 0.2, "{off} {tv} {pv} {which:?}: {error}");
                 }
@@ -129,7 +129,7 @@ fn a_lens_that_bends_lines_is_allowed_for() {
     for [tv, pv] in VIEWS {
         let truth = Pose::from_deg([30.0, 140.0, tv, pv]);
         let (found, error) = register(&scene, Role::Material, truth, read_off(truth, 0.01));
-        assert_eq!(found.state, State::Locked);
+        assert_eq!(found.state, RegistrationState::Locked);
         assert!(error < 0.06, "{tv} {pv}: {error}");
     }
 }
@@ -174,7 +174,7 @@ fn stripes_of_the_fabric_are_not_taken_for_marks() {
         for (i, pixel) in frame.rgb.iter_mut().enumerate() {
             let at = map.apply([(i % 400) as f64 + 0.5, (i / 400) as f64 + 0.5]);
             if at[0].abs().max(at[1].abs()) < 316.0 {
-                // Bright lines parallel to the marks, as wide and every 40 mm.
+                // Bright lines parallel to the fiducial lines, as wide and every 40 mm.
                 let on = at.iter().any(|c| (c.rem_euclid(40.0) - 20.0).abs() < 2.5);
                 *pixel = pixel.map(|v| v * if on { 1.0 } else { 0.3 });
             }
@@ -209,7 +209,7 @@ fn a_frame_of_something_else_falls_back_and_says_why() {
         for [tv, pv] in VIEWS {
             let reading = Pose::from_deg([30.0, 140.0, tv, pv]);
             let found = registrar.register(other, reading);
-            let State::FellBack(reason) = found.state else {
+            let RegistrationState::FellBack(reason) = found.state else {
                 panic!("{i} {tv} {pv}: locked");
             };
             assert!(!reason.to_string().is_empty());

@@ -3,8 +3,6 @@
 
 use gonia_brdf::Pose;
 use gonia_brdf::direction::{angle_between, local_direction};
-use gonia_imaging::ideal_light::IdealLight;
-use gonia_imaging::occlusion::find_occlusion;
 use gonia_imaging::*;
 use gonia_rig::{CameraModel, CameraShift, Role};
 use gonia_sim::scene::{Scene, true_brdf};

@@ -11,7 +11,7 @@ mod plan;
 
 use anyhow::{Context, Result};
 use gonia_brdf::{DenseBrdf, Grid};
-use gonia_formats::dense_exr::write_dense;
+use gonia_formats::dense::write_dense;
 use gonia_formats::samples::write_samples;
 use gonia_rig::{DenseFile, Scale};
 use std::collections::BTreeMap;

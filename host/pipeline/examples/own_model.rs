@@ -49,7 +49,7 @@ impl fmt::Display for MinnaertFamily {
 
 // ANCHOR: fit
 fn main() -> Result<(), Box<dyn Error>> {
-    // A measured BRDF comes from gonia_formats::dense_exr::read_dense.
+    // A measured BRDF comes from gonia_formats::dense::read_dense.
     let truth = Minnaert {
         albedo: [0.3, 0.2, 0.1],
         k: 1.3,

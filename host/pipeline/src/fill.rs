@@ -8,7 +8,7 @@ use gonia_brdf::interpolate::{
     self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, Preset,
 };
 use gonia_brdf::{Bins, DenseBrdf, Grid};
-use gonia_formats::dense_exr::write_dense_by_rows;
+use gonia_formats::dense::write_dense_by_rows;
 use gonia_rig::{DenseFile, SampleSet};
 use std::path::Path;
 use std::str::FromStr;

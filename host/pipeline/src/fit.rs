@@ -6,7 +6,7 @@ use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
 use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
 use gonia_brdf::{Bins, DenseBrdf, Sample};
-use gonia_formats::dense_exr::write_dense;
+use gonia_formats::dense::write_dense;
 use gonia_formats::fit_toml::FitNote;
 use gonia_rig::{DenseFile, Figures, Scale};
 use std::fmt::Display;

@@ -6,8 +6,7 @@ use crate::process::{
     process_sampled,
 };
 use crate::progress::{Progress, Step, step};
-use gonia_formats::CaptureFolder;
-use gonia_formats::summary::{FrameCounts, Refused};
+use gonia_formats::{CaptureFolder, FrameCounts, Refused};
 use gonia_rig::{FrameRow, Rig, Role, SampleSet, Scale};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;

@@ -21,7 +21,7 @@ pub struct Reach {
     pub camera_m: f64,
     /// Radius of the disc that is sampled, metres.
     pub radius_m: f64,
-    /// Highest elevations of light and view to choose from, degrees.
+    /// Largest polar angles of light and view to choose from, degrees.
     pub theta_max_deg: [f64; 2],
     /// Light and view are never nearer to each other than this, degrees: one would hide the other.
     pub keep_out_deg: f64,

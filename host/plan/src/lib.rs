@@ -49,7 +49,7 @@ impl Rings {
     }
 }
 
-/// A list of rings as people write it: `0:1,15:6,30:12` (elevation in degrees, number of
+/// A list of rings as people write it: `0:1,15:6,30:12` (polar angle in degrees, number of
 /// azimuths).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RingList(pub Vec<Ring>);
@@ -60,13 +60,13 @@ impl FromStr for RingList {
     fn from_str(text: &str) -> Result<Self, String> {
         text.split(',')
             .map(|item| {
-                let bad = || format!("'{item}' is not ELEVATION:COUNT, as in 15:6");
+                let bad = || format!("'{item}' is not POLAR:COUNT, as in 15:6");
                 let (theta, n) = item.split_once(':').ok_or_else(bad)?;
                 let theta: f64 = theta.trim().parse().map_err(|_| bad())?;
                 let n: usize = n.trim().parse().map_err(|_| bad())?;
                 if !(0.0..90.0).contains(&theta) || !(1..=3600).contains(&n) {
                     return Err(format!(
-                        "'{item}': the elevation must lie in 0..90 degrees and the count in 1..=3600"
+                        "'{item}': the polar angle must lie in 0..90 degrees and the count in 1..=3600"
                     ));
                 }
                 Ok((theta, n))

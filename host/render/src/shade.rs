@@ -190,7 +190,7 @@ impl Gathered {
         let Gathered { grid, nodes, local } = self;
         turn(*grid, frame, lights, local);
         let (last, n_phi) = (grid.n_theta() - 1, grid.n_phi());
-        let [cosines, elevations, azimuths] = local;
+        let [cosines, polar_angles, azimuths] = local;
         let irradiance = &lights.irradiance;
         let mut sum = [0.0f32; 16];
         for light in 0..irradiance.len() {
@@ -198,7 +198,7 @@ impl Gathered {
             if cosine <= LEAST_COSINE as f32 {
                 continue;
             }
-            let t = elevations[light].min(last as f32);
+            let t = polar_angles[light].min(last as f32);
             let (t0, p0) = (t as i32, azimuths[light] as i32);
             let (ft, fp) = (t - t0 as f32, azimuths[light] - p0 as f32);
             let (t0, p0) = (t0 as usize, p0 as usize);
@@ -222,7 +222,7 @@ impl Gathered {
     }
 }
 
-/// The lights in a point's frame: cosine, and elevation and azimuth in steps of the grid.
+/// The lights in a point's frame: cosine, and polar angle and azimuth in steps of the grid.
 #[inline(always)]
 fn turn(grid: Grid, frame: &TangentFrame, lights: &Lights, local: &mut [Vec<f32>; 3]) {
     let n = lights.irradiance.len();
@@ -232,12 +232,12 @@ fn turn(grid: Grid, frame: &TangentFrame, lights: &Lights, local: &mut [Vec<f32>
     let axes = [frame.tangent, frame.bitangent, frame.normal].map(|axis| axis.map(|v| v as f32));
     let steps_from_radians = 1.0 / (grid.step_deg() as f32).to_radians();
     let [xs, ys, zs] = lights.towards.each_ref().map(|axis| &axis[..n]);
-    let [cosines, elevations, azimuths] = local.each_mut().map(|array| &mut array[..n]);
+    let [cosines, polar_angles, azimuths] = local.each_mut().map(|array| &mut array[..n]);
     for k in 0..n {
         let along = |axis: [f32; 3]| axis[0] * xs[k] + axis[1] * ys[k] + axis[2] * zs[k];
         let (u, v, w) = (along(axes[0]), along(axes[1]), along(axes[2]));
         cosines[k] = w;
-        elevations[k] = steps_from_radians * arc((u * u + v * v).sqrt(), w);
+        polar_angles[k] = steps_from_radians * arc((u * u + v * v).sqrt(), w);
         azimuths[k] = steps_from_radians * arc(v, u);
     }
 }

@@ -1,7 +1,7 @@
-//! Charts of a summary: pointing errors, seconds by stage, bins by elevation.
+//! Charts of a summary: pointing errors, seconds by stage, bins by polar angle.
 
 use crate::panels;
-use gonia_formats::summary::{BinCounts, Pointing, Stage};
+use gonia_formats::{BinCounts, Pointing, Stage};
 use gonia_render::{color_map, png, svg};
 use maud::{Markup, html};
 
@@ -75,15 +75,15 @@ pub fn stages(stages: &[Stage]) -> Markup {
     )
 }
 
-/// The share of bins filled, by the elevations of light and view.
+/// The share of bins filled, by the polar angles of light and view.
 pub fn bins(bins: &BinCounts, step_deg: f64) -> Markup {
     const SIDE: f64 = 264.0;
     const LEFT: f64 = 56.0;
     const TOP: f64 = 8.0;
-    let n = bins.share_by_elevation.len();
+    let n = bins.share_by_polar_angle.len();
     // Light upwards, so the last row of the shares comes first.
     let pixels: Vec<[u8; 3]> = bins
-        .share_by_elevation
+        .share_by_polar_angle
         .iter()
         .rev()
         .flat_map(|row| (0..n).map(|v| row.get(v).copied().unwrap_or(0.0)))
@@ -101,9 +101,9 @@ pub fn bins(bins: &BinCounts, step_deg: f64) -> Markup {
             (svg::line(LEFT - 4.0, TOP + SIDE - along, LEFT, TOP + SIDE - along, "tick"))
             (svg::text(LEFT - 7.0, TOP + SIDE - along + 4.0, "end", "small", &format!("{deg}°")))
         }
-        (svg::text(LEFT + 0.5 * SIDE, TOP + SIDE + 34.0, "middle", "axis", "elevation of the view θv"))
+        (svg::text(LEFT + 0.5 * SIDE, TOP + SIDE + 34.0, "middle", "axis", "polar angle of the view θv"))
         g transform=(format!("translate(14 {}) rotate(-90)", svg::n(TOP + 0.5 * SIDE))) {
-            (svg::text(0.0, 0.0, "middle", "axis", "elevation of the light θi"))
+            (svg::text(0.0, 0.0, "middle", "axis", "polar angle of the light θi"))
         }
     };
     // The scale is that of the square root: most bins are sparsely filled.
@@ -111,7 +111,7 @@ pub fn bins(bins: &BinCounts, step_deg: f64) -> Markup {
         .map(|share: f64| (share.sqrt(), format!("{:.0} %", 100.0 * share)))
         .to_vec();
     html! {
-        (svg::drawing(LEFT + SIDE + 16.0, TOP + SIDE + 40.0, "share of bins filled by elevation", inside))
+        (svg::drawing(LEFT + SIDE + 16.0, TOP + SIDE + 40.0, "share of bins filled by polar angle", inside))
         (panels::sequential_bar(LEFT + SIDE + 16.0, ticks))
     }
 }

@@ -8,7 +8,7 @@ use gonia_render::color::luminance;
 use maud::{Markup, PreEscaped, html};
 
 const SCRIPT: &str = include_str!("explorer.js");
-/// Finest steps of the reduced table in elevation and azimuth, degrees: 22 × 60 directions, 3.5 MB
+/// Finest steps of the reduced table in polar angle and azimuth, degrees: 22 × 60 directions, 3.5 MB
 /// of text.
 const THETA_STEP_DEG: f64 = 4.0;
 const PHI_STEP_DEG: f64 = 6.0;
@@ -62,7 +62,7 @@ pub fn section(dense: &DenseBrdf, unit: &str) -> Markup {
         h2 { "Through the data" }
         p.soft {
             "Any two angles against the other two, and a sphere under one light; drawn by the page itself from every "
-            (reduced.theta_deg.get(1).copied().unwrap_or_default()) "° of elevation and " (360 / reduced.n_phi)
+            (reduced.theta_deg.get(1).copied().unwrap_or_default()) "° of polar angle and " (360 / reduced.n_phi)
             "° of azimuth, linear between."
         }
         div #explorer {
@@ -138,7 +138,7 @@ impl Reduced {
     }
 }
 
-/// Every how many nodes of elevation and of azimuth are kept.
+/// Every how many nodes of polar angle and of azimuth are kept.
 fn steps(grid: Grid) -> (usize, usize) {
     let theta = (THETA_STEP_DEG / grid.step_deg()).ceil().max(1.0) as usize;
     let least = (PHI_STEP_DEG / grid.step_deg()).ceil().max(1.0) as usize;

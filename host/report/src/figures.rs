@@ -1,8 +1,10 @@
 //! The paper's figures of a measurement, each a file of its own.
 
-use crate::folder::RIVALS_FIGURE;
+use crate::files::RIVALS_FIGURE;
+use crate::input::ReportInput;
 use crate::subspaces::Subspace;
-use crate::{ReportInput, html, panels, shots, slices, spans, subspaces};
+use crate::{html, panels, shots, slices, spans, subspaces};
+use gonia_brdf::Brdf;
 use gonia_formats::{FileError, check_writable, write_whole_bytes};
 use gonia_render as render;
 use gonia_render::{Environment, Picture, Tabulated, png, svg, tone};
@@ -17,7 +19,7 @@ const SKY_LIGHTS: usize = 512;
 
 /// Writes the figures into a folder, which is made where it is missing, and returns their paths:
 /// Fig. 2 (a sphere under the sky), Fig. 3 (spans of a frame) where the rig is known, Fig. 6 (bent
-/// around a cylinder, a light above the camera), Fig. 8 (rivals) where they were compared, and
+/// around a cylinder, a light above the camera), Fig. 8 (baselines) where they were compared, and
 /// Fig. 9 a to d (slices).
 ///
 /// # Errors
@@ -41,8 +43,8 @@ pub fn write_figures(folder: &Path, input: &ReportInput<'_>) -> Result<Vec<PathB
     let size = (PX * 2 / 3, PX);
     let bent = render::bent(&brdf, &render::single(), size, 0.0);
     keep("fig6.png", &picture_png(&bent))?;
-    let rivals = input.charts.iter().find(|(name, _)| name == RIVALS_FIGURE);
-    if let Some((_, figure)) = rivals {
+    let figure = input.charts.iter().find(|(name, _)| name == RIVALS_FIGURE);
+    if let Some((_, figure)) = figure {
         keep("fig8.svg", figure.as_bytes())?;
     }
     let table = slices::of_table(input.dense);
@@ -55,6 +57,19 @@ pub fn write_figures(folder: &Path, input: &ReportInput<'_>) -> Result<Vec<PathB
         keep(&name, svg::alone(sheet).as_bytes())?;
     }
     Ok(written)
+}
+
+/// Writes the picture of the lit sphere alone, as a PNG of `px` × `px` pixels (for a README).
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_sphere(path: &Path, brdf: &dyn Brdf, px: usize) -> Result<(), FileError> {
+    let picture = render::sphere(brdf, &render::studio(), px, 2);
+    let exposure = shots::exposure(&picture);
+    write_whole_bytes(
+        path,
+        &png::rgba(&tone::picture_rgba(&picture, exposure), px, px),
+    )
 }
 
 fn spans_alone(rig: &Rig) -> String {

@@ -12,7 +12,7 @@ pub fn section(fits: &[FitNote]) -> Markup {
     html! {
         h2 { "Models fitted" }
         p.soft {
-            "Each against the dense data: RMS of the log ratio, cosine-weighted error, mean ΔE2000 of a rendered sphere. \
+            "Each against the dense data: RMS of the log ratio, cosine-weighted error, mean ΔE00 of a rendered sphere. \
              Uncertainties are standard ones, from how much the residuals vary together over patches of 30°."
         }
         div.wide { table {

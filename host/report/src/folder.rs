@@ -1,34 +1,18 @@
 //! The report of a folder that a run left behind.
 
-use crate::{ReportInput, write_figures, write_report};
+use crate::figures::write_figures;
+use crate::files::{DENSE, ERRORS, MEASURED, REPORT, RIG, RIVALS, SUMMARY, TRUTH};
+use crate::html::write_report;
+use crate::input::ReportInput;
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
+use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::cell_mask::read_mask;
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::fit_toml::FitNote;
 use gonia_formats::rig_toml::read_rig;
-use gonia_formats::rivals_toml::Rivals;
 use gonia_formats::{FileError, Summary};
 use gonia_render::Tabulated;
 use std::path::{Path, PathBuf};
-
-/// What a run writes into its folder, and the report is drawn from.
-pub const SUMMARY: &str = "summary.toml";
-/// The dense BRDF; the only file that must be there.
-pub const DENSE: &str = "dense.exr";
-/// The true BRDF as a table of the same grid.
-pub const TRUTH: &str = "truth.exr";
-/// The cells that hold a measurement, see [`gonia_rig::CellMask`].
-pub const MEASURED: &str = "measured.npy";
-/// The standard errors of `gonia fill --error`.
-pub const ERRORS: &str = "error.exr";
-/// The comparison of `gonia rivals`.
-pub const RIVALS: &str = "rivals.toml";
-/// The figure of that comparison, without its extension.
-pub const RIVALS_FIGURE: &str = "rivals";
-/// The rig.
-pub const RIG: &str = "rig.toml";
-/// The report.
-pub const REPORT: &str = "report.html";
 
 /// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there
 /// `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
@@ -66,9 +50,9 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Vec<PathBu
         true => Some(read_rig(&rig_path)?),
         false => None,
     };
-    let rivals_path = folder.join(RIVALS);
-    let rivals = match rivals_path.exists() {
-        true => Some(Rivals::read(&rivals_path)?),
+    let baselines_path = folder.join(RIVALS);
+    let baselines = match baselines_path.exists() {
+        true => Some(BaselineTable::read(&baselines_path)?),
         false => None,
     };
     let fits = FitNote::read_all(folder)?;
@@ -81,7 +65,7 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Vec<PathBu
         errors: errors.as_ref(),
         rig: rig.as_ref(),
         fits: &fits,
-        rivals: rivals.as_ref(),
+        baselines: baselines.as_ref(),
         charts: &charts,
         ..ReportInput::new(&summary, &file.brdf)
     };
@@ -130,7 +114,7 @@ fn charts_of(folder: &Path) -> Vec<(String, String)> {
 mod tests {
     use super::*;
     use gonia_formats::cell_mask::write_mask;
-    use gonia_formats::dense_exr::write_dense;
+    use gonia_formats::dense::write_dense;
     use gonia_rig::{CellMask, DenseFile, Scale};
 
     fn flat(step_deg: f64, value: f32) -> DenseFile {

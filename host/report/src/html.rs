@@ -1,18 +1,27 @@
 //! The page: what a reader sees, in its order.
 
 use crate::charts::{seconds, thousands};
-use crate::folder::RIVALS_FIGURE;
+use crate::files::RIVALS_FIGURE;
+use crate::input::ReportInput;
 use crate::subspaces::Subspace;
-use crate::{ReportInput, charts, explorer, fits, panels, rivals, shots, slices, spans, subspaces};
+use crate::{baselines, charts, explorer, fits, panels, shots, slices, spans, subspaces};
 use gonia_brdf::{Brdf, Grid};
-use gonia_formats::Summary;
-use gonia_formats::summary::{FrameCounts, Pointing};
+use gonia_formats::{FileError, FrameCounts, Pointing, Summary, write_whole_bytes};
 use gonia_render::svg::STYLE;
 use gonia_rig::{Figures, Scale};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::path::Path;
+
+/// Writes the report whole: one HTML file that needs no other file and no network.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_report(path: &Path, input: &ReportInput<'_>) -> Result<(), FileError> {
+    write_whole_bytes(path, page(input).into_string().as_bytes())
+}
 
 /// The whole page.
-pub fn page(input: &ReportInput<'_>) -> Markup {
+fn page(input: &ReportInput<'_>) -> Markup {
     let summary = input.summary;
     let grid = input.dense.grid();
     html! {
@@ -36,7 +45,7 @@ pub fn page(input: &ReportInput<'_>) -> Markup {
                     (explorer::section(input.dense, unit_of(summary)))
                     (slice_sheets(input))
                     @if let Some(figures) = &summary.figures { (figures_table(figures)) }
-                    (rivals::section(input.rivals, rivals_figure(input.charts)))
+                    (baselines::section(input.baselines, baselines_figure(input.charts)))
                     (fits::section(input.fits))
                     (session_charts(input, grid))
                     (charts_beside(input.charts))
@@ -176,7 +185,7 @@ fn renders(input: &ReportInput<'_>) -> Markup {
             "Lit by a key light from the upper left, a fill from the right, a rim from behind and a dim dome. \
              The material's x axis runs to the right, its y axis up; sphere and cloth cast no shadows. "
             @if input.truth.is_some() {
-                "Measured and true share one exposure; their difference is ΔE2000 of what the screen shows."
+                "Measured and true share one exposure; their difference is ΔE00 of what the screen shows."
             }
         }
         div class=(class) {
@@ -222,14 +231,14 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
                     "mean over the channels of the log ratio; blue too dark, red too bright"))
             }
             @if let Some(mask) = input.measured.filter(|mask| mask.grid() == grid) {
-                (sheet(panels::marks(&slices::of_mask(mask)), "Measured bins", "the rest is interpolated"))
+                (sheet(panels::measured(&slices::of_mask(mask)), "Measured bins", "the rest is interpolated"))
             }
             @if let Some(errors) = input.errors.filter(|errors| errors.grid() == grid) {
                 (sheet(panels::shares(&slices::relative_errors(errors, input.dense)), "Error bars",
                     "standard error as a share of the value, mean over the channels"))
             }
         }
-        h2 { "Slices over the light's elevation" }
+        h2 { "Slices over the light's polar angle" }
         p.soft { "The paper's Fig. 9 b to d, measured; the scale of colours is that of the slices above." }
         div.sheets {
             @for subspace in Subspace::ALL {
@@ -240,8 +249,8 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
     }
 }
 
-/// The figure of the rivals, where it is among the charts.
-fn rivals_figure(charts: &[(String, String)]) -> Option<String> {
+/// The figure of the baselines, where it is among the charts.
+fn baselines_figure(charts: &[(String, String)]) -> Option<String> {
     let figure = charts.iter().find(|(name, _)| name == RIVALS_FIGURE);
     figure.map(|(_, svg)| svg_uri(svg))
 }
@@ -287,7 +296,7 @@ fn figures_table(figures: &Figures) -> Markup {
                     th.num { "log mean" }
                     th.num { "cos-weighted" }
                     th.num { "p99" }
-                    th.num { "ΔE2000" }
+                    th.num { "ΔE00" }
                     th.num { "reciprocity" }
                 } }
                 tbody {
@@ -307,9 +316,9 @@ fn figures_table(figures: &Figures) -> Markup {
             }
         }
         p.soft {
-            "Rendered: mean ΔE2000 of the sphere " (format!("{:.2}", figures.sphere_delta_e)) ", of the cylinder "
+            "Rendered: mean ΔE00 of the sphere " (format!("{:.2}", figures.sphere_delta_e)) ", of the cylinder "
             (format!("{:.2}", figures.cylinder_delta_e)) ". Log RMS: root mean square of ln(" (figures.a) "/" (figures.b)
-            "). Cos-weighted: |difference|·cosθi·cosθv over the mean of " (figures.b) "·cosθi·cosθv. ΔE2000 of π·f as a \
+            "). Cos-weighted: |difference|·cosθi·cosθv over the mean of " (figures.b) "·cosθi·cosθv. ΔE00 of π·f as a \
              reflectance. Reciprocity: root mean square of ln(f(i, v)/f(v, i)) of " (figures.a) "."
         }
     }
@@ -324,7 +333,7 @@ fn session_charts(input: &ReportInput<'_>, grid: Grid) -> Markup {
                     h2 { "Span of a frame" }
                     figure {
                         (spans::chart(rig))
-                        figcaption { "By how much elevations differ from the arm's at the edges of the sampled disc, eq. (2)" }
+                        figcaption { "By how much polar angles differ from the arm's at the edges of the sampled disc, eq. (2)" }
                     }
                 }
             }
@@ -387,12 +396,9 @@ fn megabytes(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::write_report;
     use gonia_brdf::DenseBrdf;
     use gonia_brdf::model::Kurt;
-    use gonia_formats::summary::{
-        BinCounts, CellCounts, FileNote, FrameCounts, PoseCounts, Refused, Stage,
-    };
+    use gonia_formats::{BinCounts, CellCounts, FileNote, FrameCounts, PoseCounts, Refused, Stage};
     use gonia_pipeline::compare::Table;
     use gonia_pipeline::{Options, Side, compare};
     use gonia_rig::CellMask;
@@ -439,7 +445,7 @@ mod tests {
             reached: 17_010,
         });
         let refused = vec![Refused {
-            reason: "marks not found".into(),
+            reason: "fiducial lines not found".into(),
             count: 4,
         }];
         summary.frames = Some(FrameCounts {

@@ -1,9 +1,9 @@
 //! The baselines of a measurement's folder: made, compared, written and drawn.
 
-use crate::folder::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
-use crate::rivals::{Row, draw_row, figure};
-use gonia_formats::dense_exr::{read_dense, write_dense};
-use gonia_formats::rivals_toml::Rivals;
+use crate::baselines::{BaselinePictures, draw_baseline, figure};
+use crate::files::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
+use gonia_formats::baselines_toml::BaselineTable;
+use gonia_formats::dense::{read_dense, write_dense};
 use gonia_formats::samples::read_samples;
 use gonia_formats::write_whole_bytes;
 use gonia_pipeline::baselines::{BaselineOptions, Made, Measurement};
@@ -25,7 +25,7 @@ pub fn make_baselines(
     step_deg: Option<f64>,
     options: &BaselineOptions,
     progress: &Progress<'_>,
-) -> Result<Rivals, Error> {
+) -> Result<BaselineTable, Error> {
     let path = |name: &str| folder.join(name);
     let samples = read_samples(&path(SAMPLES))?;
     let dense = read_dense(&path(DENSE))?;
@@ -34,21 +34,21 @@ pub fn make_baselines(
         false => None,
     };
     let measurement = Measurement::new(dense, truth, samples, step_deg)?;
-    let mut rows: Vec<Row> = vec![draw_row("dense", measurement.dense())];
+    let mut rows: Vec<BaselinePictures> = vec![draw_baseline("dense", measurement.dense())];
     let comparison = measurement.baselines(
         options,
-        &mut |rival, made| {
+        &mut |row, made| {
             match made {
                 Made::Measured => {}
                 Made::Filled(name, file) => {
                     if name == "sparse" {
-                        rows.push(draw_row(&rival.name, &file.brdf));
+                        rows.push(draw_baseline(&row.name, &file.brdf));
                     }
                     write_dense(&path(&format!("{name}.exr")), file)?;
                 }
                 Made::Fitted(result, scale) => {
-                    rows.push(draw_row(&rival.name, &result.dense));
-                    write_fit(&path(&format!("{}.exr", rival.name)), result, scale)?;
+                    rows.push(draw_baseline(&row.name, &result.dense));
+                    write_fit(&path(&format!("{}.exr", row.name)), result, scale)?;
                 }
             }
             Ok::<(), Error>(())

@@ -65,7 +65,7 @@ pub fn shares(slices: &[Slice<f32>]) -> Markup {
 }
 
 /// Measured cells in a sheet of empty ones.
-pub fn marks(slices: &[Slice<bool>]) -> Markup {
+pub fn measured(slices: &[Slice<bool>]) -> Markup {
     let paint = |marked: &bool| color_map::sequential(if *marked { 0.85 } else { 0.08 });
     let ramp = |t: f32| color_map::sequential(if t > 0.5 { 0.85 } else { 0.08 });
     let ticks = vec![
@@ -115,7 +115,7 @@ fn sheet<T>(slices: &[Slice<T>], paint: impl Fn(&T) -> [u8; 3], scale: &Scale<'_
     svg::drawing(
         width,
         height,
-        "slices over both azimuths at nine pairs of elevations",
+        "slices over both azimuths at nine pairs of polar angles",
         inside,
     )
 }

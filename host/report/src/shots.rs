@@ -24,7 +24,7 @@ pub struct BesideTruth {
     pub truth: String,
     /// Where the two differ.
     pub difference: String,
-    /// The ΔE2000 that is brightest in the difference.
+    /// The ΔE00 that is brightest in the difference.
     pub brightest_delta_e: f64,
 }
 
@@ -69,7 +69,7 @@ fn uri(pixels: &[[u8; 4]]) -> String {
     png::data_uri(&png::rgba(pixels, PX, PX))
 }
 
-/// ΔE2000 of what the screen shows, pixel by pixel.
+/// ΔE00 of what the screen shows, pixel by pixel.
 fn differences(a: &Picture, b: &Picture, exposure: f32) -> Vec<f32> {
     let shown = |rgb: &[f32; 3]| rgb.map(|v| (v * exposure).clamp(0.0, 1.0));
     a.rgb

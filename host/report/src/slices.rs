@@ -1,10 +1,10 @@
-//! Slices φi/φv at fixed elevations, as the paper's Fig. 9 a.
+//! Slices φi/φv at fixed polar angles, as the paper's Fig. 9 a.
 
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_render::color::luminance;
 use gonia_rig::CellMask;
 
-/// The elevations of the paper's figure, degrees.
+/// The polar angles of the paper's figure, degrees.
 const THETA_DEG: [f64; 3] = [30.0, 60.0, 74.0];
 
 /// One slice: `n` × `n` values, φv to the right, φi upwards (the first row is the last φi).
@@ -17,7 +17,7 @@ pub struct Slice<T> {
     pub values: Vec<T>,
 }
 
-/// The nine pairs of elevations, light by light.
+/// The nine pairs of polar angles, light by light.
 fn each<T>(grid: Grid, mut value: impl FnMut(usize, usize) -> T) -> Vec<Slice<T>> {
     let n = grid.n_phi();
     let node =

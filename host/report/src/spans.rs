@@ -1,4 +1,4 @@
-//! The spans of elevation within one frame, as the paper's Fig. 3: eqs. (1) and (2).
+//! The spans of polar angle within one frame, as the paper's Fig. 3: eqs. (1) and (2).
 
 use gonia_brdf::Direction;
 use gonia_brdf::direction::local_direction;
@@ -6,7 +6,7 @@ use gonia_render::svg;
 use gonia_rig::Rig;
 use maud::{Markup, html};
 
-/// The change of elevation at the edges of the disc, towards the arm and away from it, degrees.
+/// The change of polar angle at the edges of the disc, towards the arm and away from it, degrees.
 fn span_deg(theta_deg: f64, distance_m: f64, radius_m: f64) -> [f64; 2] {
     let arm = Direction::from_deg(theta_deg, 0.0);
     [radius_m, -radius_m].map(|x| {
@@ -15,7 +15,7 @@ fn span_deg(theta_deg: f64, distance_m: f64, radius_m: f64) -> [f64; 2] {
     })
 }
 
-/// Both spans over the elevation of the arm.
+/// Both spans over the polar angle of the arm.
 pub fn chart(rig: &Rig) -> Markup {
     const W: f64 = 380.0;
     const H: f64 = 240.0;
@@ -63,9 +63,9 @@ pub fn chart(rig: &Rig) -> Markup {
                 y1=(svg::n(TOP + 9.0 + 14.0 * k as f64)) y2=(svg::n(TOP + 9.0 + 14.0 * k as f64))
                 stroke=(color) stroke-width="2.4" {}
         }
-        (svg::text(0.5 * (W + LEFT), H - 6.0, "middle", "axis", "elevation of the arm"))
+        (svg::text(0.5 * (W + LEFT), H - 6.0, "middle", "axis", "polar angle of the arm"))
     };
-    svg::drawing(W, H, "span of elevations within a frame", inside)
+    svg::drawing(W, H, "span of polar angles within a frame", inside)
 }
 
 #[cfg(test)]

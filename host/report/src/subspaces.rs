@@ -1,5 +1,5 @@
-//! The subspaces of the paper's Fig. 9 b–d: elevation of the light against an azimuth or the
-//! elevation of the view, the other two angles from panel to panel.
+//! The subspaces of the paper's Fig. 9 b–d: polar angle of the light against an azimuth or the
+//! polar angle of the view, the other two angles from panel to panel.
 
 use gonia_brdf::{DenseBrdf, Direction};
 use gonia_render::{png, svg, tone};
@@ -7,10 +7,10 @@ use maud::{Markup, html};
 
 /// The azimuths that panels stand for, degrees.
 const PHI_DEG: [f64; 6] = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
-/// The elevations.
+/// The polar angles.
 const THETA_DEG: [f64; 3] = [30.0, 60.0, 74.0];
 
-/// A part of the figure. The elevation of the light runs upwards in all.
+/// A part of the figure. The polar angle of the light runs upwards in all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subspace {
     /// b: φv to the right; φi from column to column, θv from row to row.
@@ -18,7 +18,7 @@ pub enum Subspace {
     /// c: φi to the right; φv from column to column, θv from row to row.
     LightAzimuth,
     /// d: θv to the right; φi from column to column, φv from row to row.
-    ViewElevation,
+    ViewPolarAngle,
 }
 
 impl Subspace {
@@ -26,7 +26,7 @@ impl Subspace {
     pub const ALL: [Subspace; 3] = [
         Subspace::ViewAzimuth,
         Subspace::LightAzimuth,
-        Subspace::ViewElevation,
+        Subspace::ViewPolarAngle,
     ];
 
     /// What is drawn, in a few words.
@@ -34,7 +34,7 @@ impl Subspace {
         match self {
             Subspace::ViewAzimuth => "θi against φv",
             Subspace::LightAzimuth => "θi against φi",
-            Subspace::ViewElevation => "θi against θv",
+            Subspace::ViewPolarAngle => "θi against θv",
         }
     }
 
@@ -42,13 +42,13 @@ impl Subspace {
         match self {
             Subspace::ViewAzimuth => "azimuth of the view φv",
             Subspace::LightAzimuth => "azimuth of the light φi",
-            Subspace::ViewElevation => "elevation of the view θv",
+            Subspace::ViewPolarAngle => "polar angle of the view θv",
         }
     }
 
     fn rows(self) -> &'static [f64] {
         match self {
-            Subspace::ViewElevation => &PHI_DEG,
+            Subspace::ViewPolarAngle => &PHI_DEG,
             _ => &THETA_DEG,
         }
     }
@@ -57,7 +57,7 @@ impl Subspace {
         match self {
             Subspace::ViewAzimuth => format!("φi {column_deg}° θv {row_deg}°"),
             Subspace::LightAzimuth => format!("φv {column_deg}° θv {row_deg}°"),
-            Subspace::ViewElevation => format!("φi {column_deg}° φv {row_deg}°"),
+            Subspace::ViewPolarAngle => format!("φi {column_deg}° φv {row_deg}°"),
         }
     }
 
@@ -67,7 +67,7 @@ impl Subspace {
         match self {
             Subspace::ViewAzimuth => (d(theta_i, column), d(row, right)),
             Subspace::LightAzimuth => (d(theta_i, right), d(row, column)),
-            Subspace::ViewElevation => (d(theta_i, column), d(right, row)),
+            Subspace::ViewPolarAngle => (d(theta_i, column), d(right, row)),
         }
     }
 }
@@ -80,7 +80,7 @@ pub fn sheet(dense: &DenseBrdf, subspace: Subspace, factor: f32, white: f32) -> 
     const WIDTH: f64 = 92.0;
     let grid = dense.grid();
     let theta_max = (grid.n_theta() - 1) as f64 * grid.step_deg();
-    let is_square = subspace == Subspace::ViewElevation;
+    let is_square = subspace == Subspace::ViewPolarAngle;
     let height = if is_square { WIDTH } else { 64.0 };
     let (columns, right_max) = if is_square {
         (grid.n_theta(), theta_max)
@@ -136,7 +136,7 @@ pub fn sheet(dense: &DenseBrdf, subspace: Subspace, factor: f32, white: f32) -> 
         @for row in 0..rows.len() { @for column in 0..PHI_DEG.len() { (panel(column, row)) } }
         (svg::text(LEFT + 3.0 * WIDTH, bottom + 32.0, "middle", "axis", subspace.axis()))
         g transform=(format!("translate(11 {}) rotate(-90)", svg::n(0.5 * bottom))) {
-            (svg::text(0.0, 0.0, "middle", "axis", "elevation of the light θi"))
+            (svg::text(0.0, 0.0, "middle", "axis", "polar angle of the light θi"))
         }
     };
     svg::drawing(whole_width, bottom + 38.0, subspace.name(), inside)

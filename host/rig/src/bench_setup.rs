@@ -1,7 +1,9 @@
 //! What `rig.toml` says of the bench itself: ports, where frames come from, how a session goes. Only
 //! `gonia capture` needs it.
 
-use crate::{Genicam, RigError, Sensor};
+use crate::genicam::{Genicam, default_timeout_s};
+use crate::rig_error::RigError;
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// The arms' controllers.
@@ -114,10 +116,6 @@ fn default_seed() -> u64 {
     1
 }
 
-pub(crate) fn default_timeout_s() -> f64 {
-    10.0
-}
-
 fn default_every_s() -> f64 {
     60.0
 }
@@ -132,13 +130,6 @@ pub(crate) fn check_bench(
     session: Option<&SessionSettings>,
     sensor: Option<&Sensor>,
 ) -> Result<(), RigError> {
-    let refuse = |key, problem: String, remedy: &str| {
-        Err(RigError {
-            key,
-            problem,
-            remedy: remedy.into(),
-        })
-    };
     if let Some(arms) = arms
         && !(0.0..180.0).contains(&arms.keep_out_deg)
     {
@@ -148,35 +139,44 @@ pub(crate) fn check_bench(
             "give degrees from 0 to below 180",
         );
     }
+    if let Some(source) = source {
+        check_source(source, session, sensor)?;
+    }
+    session.map_or(Ok(()), check_session)
+}
+
+fn check_source(
+    source: &Source,
+    session: Option<&SessionSettings>,
+    sensor: Option<&Sensor>,
+) -> Result<(), RigError> {
     match source {
-        Some(
-            Source::Folder { timeout_s, .. }
-            | Source::Command { timeout_s, .. }
-            | Source::Genicam(Genicam { timeout_s, .. }),
-        ) if !(0.01..=86_400.0).contains(timeout_s) => {
-            return refuse(
+        Source::Folder { timeout_s, .. }
+        | Source::Command { timeout_s, .. }
+        | Source::Genicam(Genicam { timeout_s, .. })
+            if !(0.01..=86_400.0).contains(timeout_s) =>
+        {
+            refuse(
                 "source.timeout_s",
                 format!("{timeout_s} s is not possible"),
                 "give seconds from 0.01 to 86400",
-            );
+            )
         }
-        Some(Source::Command { run, .. })
+        Source::Command { run, .. }
             if run.is_empty() || !run.iter().any(|word| word.contains("{file}")) =>
         {
-            return refuse(
+            refuse(
                 "source.run",
                 "names no {file}".into(),
                 "give a program and its arguments, one of them {file}: where it leaves the frame",
-            );
+            )
         }
-        Some(Source::Genicam(camera)) => {
-            camera.check(sensor, session.map_or(1, |s| s.exposures_s.len()))?;
-        }
-        _ => {}
+        Source::Genicam(camera) => camera.check(sensor, session.map_or(1, |s| s.exposures_s.len())),
+        _ => Ok(()),
     }
-    let Some(session) = session else {
-        return Ok(());
-    };
+}
+
+fn check_session(session: &SessionSettings) -> Result<(), RigError> {
     let times = &session.exposures_s;
     if times.is_empty() || times.len() > 8 || !times.iter().all(|t| (1e-5..=600.0).contains(t)) {
         return refuse(
@@ -206,9 +206,13 @@ pub(crate) fn check_bench(
             "give seconds from 0 to 86400",
         );
     }
-    let Some(thermometer) = &session.thermometer else {
-        return Ok(());
-    };
+    session
+        .thermometer
+        .as_ref()
+        .map_or(Ok(()), check_thermometer)
+}
+
+fn check_thermometer(thermometer: &Thermometer) -> Result<(), RigError> {
     if thermometer.run.is_empty() {
         return refuse(
             "session.thermometer.run",
@@ -232,6 +236,10 @@ pub(crate) fn check_bench(
         );
     }
     Ok(())
+}
+
+fn refuse(key: &'static str, problem: String, remedy: &str) -> Result<(), RigError> {
+    Err(RigError::new(key, problem, remedy))
 }
 
 #[cfg(test)]

@@ -51,9 +51,9 @@ impl CellMask {
             .sum()
     }
 
-    /// The share of cells in the set by elevations, `[iθi][iθv]`, each 0 ..= 1. Poles count as one
+    /// The share of cells in the set by polar angles, `[iθi][iθv]`, each 0 ..= 1. Poles count as one
     /// direction, because samples at a pole belong to its first azimuth.
-    pub fn share_by_elevation(&self) -> Vec<Vec<f32>> {
+    pub fn share_by_polar_angle(&self) -> Vec<Vec<f32>> {
         let grid = self.grid;
         let azimuths = |i_theta: usize| if i_theta == 0 { 1 } else { grid.n_phi() };
         (0..grid.n_theta())

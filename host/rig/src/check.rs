@@ -1,38 +1,35 @@
 //! Whether a rig could exist.
 
 use crate::bench_setup::check_bench;
-use crate::{Reference, Rig, Sensor};
-use std::ops::RangeInclusive;
-
-/// A value that no rig has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key}: {problem}; {remedy}")]
-pub struct RigError {
-    /// The key in `rig.toml`, with its table.
-    pub key: &'static str,
-    /// What is wrong with its value.
-    pub problem: String,
-    /// What to do.
-    pub remedy: String,
-}
+use crate::rig_error::within;
+use crate::{Camera, Light, Reference, Rig, RigError, Sampling, Sensor, Target};
 
 /// Checks that a rig could exist, whoever made it.
 ///
 /// # Errors
 /// The first value that is not possible, in the order of the file.
 pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
-    let Rig {
-        light,
-        camera,
-        target,
-        reference,
-        sensor,
-        sampling,
-        arms,
-        source,
-        session,
-    } = rig;
-    within("light.distance_m", light.distance_m, 0.01..=1000.0, "m")?;
+    within("light.distance_m", rig.light.distance_m, 0.01..=1000.0, "m")?;
+    check_camera(&rig.camera)?;
+    check_target(&rig.target)?;
+    if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
+        for rho in *reflectance {
+            within("reference.reflectance", rho, f64::MIN_POSITIVE..=1.0, "")?;
+        }
+    }
+    if let Some(sensor) = &rig.sensor {
+        check_sensor(sensor)?;
+    }
+    check_sampling(&rig.sampling, &rig.target, &rig.light, &rig.camera)?;
+    check_bench(
+        rig.arms.as_ref(),
+        rig.source.as_ref(),
+        rig.session.as_ref(),
+        rig.sensor.as_ref(),
+    )
+}
+
+fn check_camera(camera: &Camera) -> Result<(), RigError> {
     within("camera.distance_m", camera.distance_m, 0.01..=1000.0, "m")?;
     let sides = 16.0..=65_536.0;
     within(
@@ -54,7 +51,10 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     }
     within("camera.k1", camera.k1, -10.0..=10.0, "")?;
     within("camera.k2", camera.k2, -10.0..=10.0, "")?;
+    Ok(())
+}
 
+fn check_target(target: &Target) -> Result<(), RigError> {
     within(
         "target.line_offset_mm",
         target.line_offset_mm,
@@ -85,17 +85,15 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
             remedy: "measure both from the centre of the target".into(),
         });
     }
+    Ok(())
+}
 
-    if let Some(Reference::Reflectance(reflectance)) = reference {
-        for rho in *reflectance {
-            within("reference.reflectance", rho, f64::MIN_POSITIVE..=1.0, "")?;
-        }
-    }
-
-    if let Some(sensor) = sensor {
-        check_sensor(sensor)?;
-    }
-
+fn check_sampling(
+    sampling: &Sampling,
+    target: &Target,
+    light: &Light,
+    camera: &Camera,
+) -> Result<(), RigError> {
     within(
         "sampling.disc_radius_mm",
         sampling.disc_radius_mm,
@@ -137,12 +135,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
             remedy: "check the units: distances of the arms are in metres".into(),
         });
     }
-    check_bench(
-        arms.as_ref(),
-        source.as_ref(),
-        session.as_ref(),
-        sensor.as_ref(),
-    )
+    Ok(())
 }
 
 fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
@@ -181,33 +174,5 @@ fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
             sensor.saturation_counts, sensor.black_counts
         ),
         remedy: "give the counts of a frame without light, and those the sensor ends at".into(),
-    })
-}
-
-fn within(
-    key: &'static str,
-    value: f64,
-    range: RangeInclusive<f64>,
-    unit: &str,
-) -> Result<(), RigError> {
-    // Written so that a NaN is outside of every range.
-    if range.contains(&value) {
-        return Ok(());
-    }
-    let (least, most) = (range.start(), range.end());
-    let unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
-    let remedy = if *least == f64::MIN_POSITIVE {
-        format!("give more than 0 and at most {most}{unit}")
-    } else {
-        format!("give a value from {least} to {most}{unit}")
-    };
-    Err(RigError {
-        key,
-        problem: format!("{value}{unit} is not possible"),
-        remedy,
     })
 }

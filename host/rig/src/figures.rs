@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fmt::Write as _;
 
-/// How far a BRDF `a` is from another, `b`. See [`gonia_pipeline::compare()`] for what is compared.
+/// How far a BRDF `a` is from another, `b`. See `gonia_pipeline::compare` for what is compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figures {
@@ -27,9 +27,9 @@ pub struct Figures {
     /// the interior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
-    /// Mean ΔE2000 over the lit pixels of a rendered sphere.
+    /// Mean ΔE00 over the lit pixels of a rendered sphere.
     pub sphere_delta_e: f64,
-    /// Mean ΔE2000 over the lit pixels of a rendered cylinder.
+    /// Mean ΔE00 over the lit pixels of a rendered cylinder.
     pub cylinder_delta_e: f64,
     /// Figures by part of the domain. Parts without a cell are left out.
     pub strata: Vec<StratumFigures>,
@@ -51,7 +51,7 @@ pub struct StratumFigures {
     pub cos_error_mean: f64,
     /// 99th percentile of |a − b|·cosθi·cosθv over the mean of b·cosθi·cosθv.
     pub cos_error_p99: f64,
-    /// Mean ΔE2000 of π·f seen as a reflectance; absent where no cell of the share lay in it.
+    /// Mean ΔE00 of π·f seen as a reflectance; absent where no cell of the share lay in it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delta_e: Option<f64>,
     /// Root mean square of ln(a(i, v)/a(v, i)).
@@ -140,7 +140,7 @@ impl fmt::Display for Figures {
             "log mean",
             "cos mean",
             "cos p99",
-            "ΔE2000",
+            "ΔE00",
             "recip. a",
             "recip. b"
         )?;
@@ -165,7 +165,7 @@ impl fmt::Display for Figures {
         }
         write!(
             f,
-            "rendered   ΔE2000 sphere {:.2}, cylinder {:.2}",
+            "rendered   ΔE00 sphere {:.2}, cylinder {:.2}",
             self.sphere_delta_e, self.cylinder_delta_e
         )
     }

@@ -7,7 +7,7 @@ use gonia_brdf::Pose;
 pub enum Role {
     /// The material that is being measured.
     Material,
-    /// The reference that frames are compensated by.
+    /// The reference that frames are calibrated against.
     Reference,
 }
 

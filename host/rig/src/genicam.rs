@@ -1,6 +1,7 @@
 //! What `rig.toml` says of a GenICam camera.
 
-use crate::{Bayer, RigError, Sensor};
+use crate::rig_error::RigError;
+use crate::sensor::{Bayer, Sensor};
 use serde::{Deserialize, Serialize};
 use std::net::Ipv4Addr;
 
@@ -22,7 +23,7 @@ pub struct Genicam {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub features: Vec<String>,
     /// How long a frame may take after its trigger, seconds.
-    #[serde(default = "crate::bench_setup::default_timeout_s")]
+    #[serde(default = "default_timeout_s")]
     pub timeout_s: f64,
 }
 
@@ -88,13 +89,7 @@ impl Genicam {
     /// # Errors
     /// The first value that is not possible.
     pub(crate) fn check(&self, sensor: Option<&Sensor>, exposures: usize) -> Result<(), RigError> {
-        let refuse = |key, problem: String, remedy: &str| {
-            Err(RigError {
-                key,
-                problem,
-                remedy: remedy.into(),
-            })
-        };
+        let refuse = |key, problem: String, remedy: &str| Err(RigError::new(key, problem, remedy));
         if self.ip().is_none() {
             return refuse(
                 "source.address",
@@ -159,6 +154,11 @@ fn is_setting(text: &str) -> bool {
     text.split_once('=')
         .is_some_and(|(name, value)| !name.is_empty() && !value.is_empty())
         && !text.contains(char::is_whitespace)
+}
+
+/// Of every source of frames, seconds.
+pub(crate) fn default_timeout_s() -> f64 {
+    10.0
 }
 
 fn default_trigger_source() -> String {

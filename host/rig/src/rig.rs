@@ -1,6 +1,7 @@
 //! `rig.toml`: where light, camera and target are.
 
-use crate::{ArmPorts, SessionSettings, Source};
+use crate::bench_setup::{ArmPorts, SessionSettings, Source};
+use crate::sensor::Sensor;
 use gonia_brdf::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,7 @@ pub struct Rig {
     pub light: Light,
     /// The camera.
     pub camera: Camera,
-    /// The target's marks and the sample's size.
+    /// The target's fiducial lines and the sample's size.
     pub target: Target,
     /// The reference's reflectance, where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -85,7 +86,7 @@ pub enum Reference {
     Table {
         /// The table's CSV, relative to the rig's folder.
         file: String,
-        /// Its rows, once [`read_rig`](gonia_formats::rig_toml::read_rig) has read them.
+        /// Its rows, once `gonia_formats::rig_toml::read_rig` has read them.
         table: ReflectanceTable,
     },
 }
@@ -134,46 +135,6 @@ impl From<Reference> for ReferenceKeys {
     }
 }
 
-/// A linear sensor, for frames whose rows in `frames.csv` have an exposure time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sensor {
-    /// Counts without light.
-    pub black_counts: f64,
-    /// Counts at and above which the sensor is no longer linear.
-    pub saturation_counts: f64,
-    /// Electrons a count: what shot noise follows from.
-    pub gain_e_per_count: f64,
-    /// Standard deviation of the read noise, electrons.
-    pub read_noise_e: f64,
-    /// The colour filters; without them a grey frame is that of a mono sensor.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bayer: Option<Bayer>,
-}
-
-/// Colour filters of the top left 2 × 2 photosites, row by row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "UPPERCASE")]
-#[allow(missing_docs)]
-pub enum Bayer {
-    Rggb,
-    Bggr,
-    Grbg,
-    Gbrg,
-}
-
-impl Bayer {
-    /// Channel (0 red, 1 green, 2 blue) by row and column.
-    pub fn colors(self) -> [[usize; 2]; 2] {
-        match self {
-            Bayer::Rggb => [[0, 1], [1, 2]],
-            Bayer::Bggr => [[2, 1], [1, 0]],
-            Bayer::Grbg => [[1, 0], [2, 1]],
-            Bayer::Gbrg => [[1, 2], [0, 1]],
-        }
-    }
-}
-
 /// The sampling points of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -192,7 +153,7 @@ fn is_zero(value: &f64) -> bool {
 
 impl Rig {
     /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
-    /// elevation up to 75°.
+    /// polar angle up to 75°.
     pub fn paper(px: usize) -> Self {
         Self {
             light: Light { distance_m: 1.1 },

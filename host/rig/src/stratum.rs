@@ -9,12 +9,13 @@ use std::fmt;
 pub enum Stratum {
     /// Every cell.
     All,
-    /// Both elevations at most 75°, where views were taken.
+    /// Both polar angles at most 75°, where views were taken.
     Interior,
-    /// Either elevation above 75°.
+    /// Either polar angle above 75°.
     Grazing,
-    /// Both elevations above 78°, where nothing can be measured.
-    Void,
+    /// The unmeasured region: both polar angles above 78°, where no frame can be taken.
+    #[serde(alias = "void")]
+    Unmeasured,
     /// The one per cent of cells with the largest luminance · cos θi · cos θv of the second BRDF.
     Highlight,
     /// Light and view less than 8° apart, where the light's arm is in the way.
@@ -27,7 +28,7 @@ impl Stratum {
         Stratum::All,
         Stratum::Interior,
         Stratum::Grazing,
-        Stratum::Void,
+        Stratum::Unmeasured,
         Stratum::Highlight,
         Stratum::Retro,
     ];
@@ -38,7 +39,7 @@ impl Stratum {
             Stratum::All => "all",
             Stratum::Interior => "interior",
             Stratum::Grazing => "grazing",
-            Stratum::Void => "void",
+            Stratum::Unmeasured => "unmeasured",
             Stratum::Highlight => "highlight",
             Stratum::Retro => "retro",
         }
@@ -50,7 +51,7 @@ impl Stratum {
             Stratum::All => "every cell",
             Stratum::Interior => "both θ ≤ 75°",
             Stratum::Grazing => "either θ > 75°",
-            Stratum::Void => "both θ > 78°, never measured",
+            Stratum::Unmeasured => "both θ > 78°, never measured",
             Stratum::Highlight => "brightest 1 % (cosine-weighted)",
             Stratum::Retro => "light and view within 8°",
         }
@@ -67,7 +68,7 @@ impl fmt::Display for Stratum {
 pub type StratumBits = u8;
 
 const INTERIOR_DEG: f64 = 75.0;
-const VOID_DEG: f64 = 78.0;
+const UNMEASURED_DEG: f64 = 78.0;
 const RETRO_DEG: f64 = 8.0;
 /// Nodes lie on such angles; rounding must not push one across.
 const SLACK_DEG: f64 = 1e-6;
@@ -81,7 +82,7 @@ pub fn of_geometry(theta_i_deg: f64, theta_v_deg: f64, cos_between: f64) -> Stra
     bit(Stratum::All, true)
         | bit(Stratum::Interior, interior)
         | bit(Stratum::Grazing, !interior)
-        | bit(Stratum::Void, least > VOID_DEG + SLACK_DEG)
+        | bit(Stratum::Unmeasured, least > UNMEASURED_DEG + SLACK_DEG)
         | bit(
             Stratum::Retro,
             cos_between > (RETRO_DEG - SLACK_DEG).to_radians().cos(),
@@ -96,9 +97,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn files_with_the_old_word_for_the_unmeasured_region_are_still_read() {
+        #[derive(Deserialize, Serialize)]
+        struct Row {
+            stratum: Stratum,
+        }
+        for word in ["void", "unmeasured"] {
+            let row: Row = toml::from_str(&format!("stratum = \"{word}\"")).unwrap();
+            assert_eq!(row.stratum, Stratum::Unmeasured);
+            let written = toml::to_string(&row).unwrap();
+            assert_eq!(written, "stratum = \"unmeasured\"\n");
+        }
+    }
+
+    #[test]
     fn the_limits_are_those_of_the_definitions() {
         let has = |bits: StratumBits, stratum: Stratum| bits >> (stratum as u8) & 1 == 1;
-        for (i, v, interior, void) in [
+        for (i, v, interior, unmeasured) in [
             (74.0, 74.0, true, false),
             (75.0, 0.0, true, false),
             (76.0, 0.0, false, false),
@@ -109,7 +124,7 @@ mod tests {
             assert!(has(bits, Stratum::All));
             assert_eq!(has(bits, Stratum::Interior), interior);
             assert_eq!(has(bits, Stratum::Grazing), !interior);
-            assert_eq!(has(bits, Stratum::Void), void);
+            assert_eq!(has(bits, Stratum::Unmeasured), unmeasured);
         }
         assert!(has(
             of_geometry(0.0, 6.0, 6f64.to_radians().cos()),

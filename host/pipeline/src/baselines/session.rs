@@ -10,7 +10,7 @@ use crate::provenance::of_this_program;
 use gonia_brdf::baselines::BaselineSettings;
 use gonia_brdf::fit::{FitSettings, StandardFamily};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
-use gonia_formats::rivals_toml::{Rival, Rivals};
+use gonia_formats::baselines_toml::{BaselineRow, BaselineTable};
 use gonia_render::Tabulated;
 use gonia_rig::{DenseFile, Figures, SampleSet, Scale};
 use std::time::Instant;
@@ -114,53 +114,53 @@ impl Measurement {
     pub fn baselines<E: From<Error>>(
         mut self,
         options: &BaselineOptions,
-        take: &mut dyn FnMut(&Rival, Made) -> Result<(), E>,
+        take: &mut dyn FnMut(&BaselineRow, Made) -> Result<(), E>,
         progress: &Progress<'_>,
-    ) -> Result<Rivals, E> {
-        let mut comparison = Rivals::default();
-        let mut keep = |rival: Rival, made: Made| {
-            take(&rival, made)?;
-            comparison.rows.push(rival);
+    ) -> Result<BaselineTable, E> {
+        let mut comparison = BaselineTable::default();
+        let mut keep = |row: BaselineRow, made: Made| {
+            take(&row, made)?;
+            comparison.rows.push(row);
             Ok::<(), E>(())
         };
         let samples = std::mem::take(&mut self.samples);
         keep(self.itself(samples.len())?, Made::Measured)?;
         if !options.without_paper {
-            let (rival, table) = self.paper(&samples, "paper", progress)?;
-            keep(rival, self.made("paper", table, "the paper's method"))?;
+            let (row, table) = self.paper(&samples, "paper", progress)?;
+            keep(row, self.made("paper", table, "the paper's method"))?;
         }
         let central = centres(&samples);
         drop(samples);
 
         if !options.without_paper {
-            let (rival, table) = self.paper(&central, "sparse-paper", progress)?;
+            let (row, table) = self.paper(&central, "sparse-paper", progress)?;
             let what = "the paper's method on central samples only";
-            keep(rival, self.made("sparse-paper", table, what))?;
+            keep(row, self.made("sparse-paper", table, what))?;
         }
         let what = "one sample a frame, gonia's interpolation";
-        let (rival, sparse) = self.filled(central, "sparse", what, progress)?;
-        keep(rival, self.made("sparse", sparse, "central samples only"))?;
+        let (row, sparse) = self.filled(central, "sparse", what, progress)?;
+        keep(row, self.made("sparse", sparse, "central samples only"))?;
 
         // Strips see the material itself: the truth, or the best that is known of it.
         let material = self.truth.as_ref().unwrap_or(&self.dense);
         let strips = measure_on_strips(&Tabulated::new(&material.brdf), 1);
         let what = "simulated: 20 strips on a cylinder, with its noise";
-        let (rival, strips) = self.filled(strips, "strips", what, progress)?;
+        let (row, strips) = self.filled(strips, "strips", what, progress)?;
         let what = "simulated strips on a cylinder";
-        keep(rival, self.made("strips", strips, what))?;
+        keep(row, self.made("strips", strips, what))?;
 
         for family in [
             StandardFamily::Kurt { lobes: 2 },
             StandardFamily::Sadeghi { scaled: false },
         ] {
-            let (rival, result) = self.fitted(family, &options.fits, progress)?;
-            keep(rival, Made::Fitted(result, self.dense.scale))?;
+            let (row, result) = self.fitted(family, &options.fits, progress)?;
+            keep(row, Made::Fitted(result, self.dense.scale))?;
         }
         Ok(comparison)
     }
 
-    fn itself(&self, samples: usize) -> Result<Rival, Error> {
-        Ok(Rival {
+    fn itself(&self, samples: usize) -> Result<BaselineRow, Error> {
+        Ok(BaselineRow {
             name: "dense".into(),
             what: "all samples, gonia's interpolation".into(),
             numbers: samples as u64,
@@ -177,7 +177,7 @@ impl Measurement {
         samples: &[Sample],
         name: &str,
         progress: &Progress<'_>,
-    ) -> Result<(Rival, DenseBrdf), Error> {
+    ) -> Result<(BaselineRow, DenseBrdf), Error> {
         let grid = check_grid(self.grid).ok_or_else(|| Error::Option {
             option: "steps of",
             found: format!("{} degrees", self.grid.step_deg()),
@@ -205,7 +205,7 @@ impl Measurement {
             (&table, name, Scale::Absolute),
             (&other, "dense", Scale::Absolute),
         )?;
-        let rival = Rival {
+        let row = BaselineRow {
             name: name.to_owned(),
             what: format!(
                 "the paper's method, at steps of {}°; time for all cells extrapolated",
@@ -217,7 +217,7 @@ impl Measurement {
             against_truth,
             is_partial: true,
         };
-        Ok((rival, table))
+        Ok((row, table))
     }
 
     /// Samples interpolated by gonia's own method.
@@ -227,7 +227,7 @@ impl Measurement {
         name: &str,
         what: &str,
         progress: &Progress<'_>,
-    ) -> Result<(Rival, DenseBrdf), Error> {
+    ) -> Result<(BaselineRow, DenseBrdf), Error> {
         let numbers = samples.len() as u64;
         let set = SampleSet {
             samples,
@@ -237,7 +237,7 @@ impl Measurement {
         let start = Instant::now();
         let brdf = fill(set, &options, progress)?.dense.brdf;
         let seconds = start.elapsed().as_secs_f64();
-        let rival = Rival {
+        let row = BaselineRow {
             name: name.to_owned(),
             what: what.to_owned(),
             numbers,
@@ -249,7 +249,7 @@ impl Measurement {
             against_truth: self.against_truth(&brdf, name)?,
             is_partial: false,
         };
-        Ok((rival, brdf))
+        Ok((row, brdf))
     }
 
     /// A model fitted to the measurement.
@@ -258,12 +258,12 @@ impl Measurement {
         family: StandardFamily,
         settings: &FitSettings,
         progress: &Progress<'_>,
-    ) -> Result<(Rival, FitResult), Error> {
+    ) -> Result<(BaselineRow, FitResult), Error> {
         let cells = cells_of_dense(&self.dense.brdf, settings);
         let family = family.for_values(self.dense.scale == Scale::Relative);
         let result = fit_model(&self.dense, "dense.exr", &cells, family, settings, progress)?;
         let note = &result.note;
-        let rival = Rival {
+        let row = BaselineRow {
             name: note.model.clone(),
             what: if note.converged {
                 "fitted to the dense measurement".into()
@@ -276,7 +276,7 @@ impl Measurement {
             against_truth: self.against_truth(&result.dense, &note.model)?,
             is_partial: false,
         };
-        Ok((rival, result))
+        Ok((row, result))
     }
 
     fn against_truth(&self, brdf: &DenseBrdf, name: &str) -> Result<Option<Figures>, Error> {

@@ -3,8 +3,7 @@
 
 use crate::process::account::{FrameReport, Outcome};
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::occlusion::find_occlusion;
-use gonia_imaging::{LeftOut, Mask, Registrar, Registration, SamplingGrid};
+use gonia_imaging::{LeftOut, Mask, Registrar, Registration, SamplingGrid, find_occlusion};
 use gonia_rig::{Frame, FrameRow, Rig};
 
 /// What one grid point shows.

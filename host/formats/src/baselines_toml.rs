@@ -1,4 +1,4 @@
-//! `rivals.toml`: how other ways to the same BRDF compare, as `gonia rivals` found.
+//! `rivals.toml`: how the baselines, other ways to the same BRDF, compare, as `gonia rivals` found.
 
 use crate::{FileError, toml_text, write_whole_bytes};
 use gonia_rig::Figures;
@@ -8,15 +8,15 @@ use std::path::Path;
 /// All that were compared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rivals {
-    /// One a way, in the order of the table.
-    pub rows: Vec<Rival>,
+pub struct BaselineTable {
+    /// One a baseline, in the order of the table.
+    pub rows: Vec<BaselineRow>,
 }
 
-/// One way to a BRDF.
+/// One baseline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rival {
+pub struct BaselineRow {
     /// Its name.
     pub name: String,
     /// What it is made of, in a few words.
@@ -35,7 +35,7 @@ pub struct Rival {
     pub is_partial: bool,
 }
 
-impl Rivals {
+impl BaselineTable {
     /// Reads a comparison.
     ///
     /// # Errors

@@ -2,23 +2,23 @@
 
 use crate::{charts, shots};
 use gonia_brdf::{Brdf, DenseBrdf, Direction};
-use gonia_formats::rivals_toml::{Rival, Rivals};
+use gonia_formats::baselines_toml::{BaselineRow, BaselineTable};
 use gonia_render as render;
 use gonia_render::{Environment, Light, Picture, Tabulated, png, svg, tone};
 use gonia_rig::{Figures, Stratum};
 use maud::{Markup, PreEscaped, html};
 
 /// The table, and the figure (an image's address) where there is one; nothing without a comparison.
-pub fn section(rivals: Option<&Rivals>, figure: Option<String>) -> Markup {
-    let Some(rivals) = rivals else {
+pub(crate) fn section(baselines: Option<&BaselineTable>, figure: Option<String>) -> Markup {
+    let Some(baselines) = baselines else {
         return html! {};
     };
-    let has_truth = rivals.rows.iter().any(|row| row.against_truth.is_some());
+    let has_truth = baselines.rows.iter().any(|row| row.against_truth.is_some());
     html! {
         h2 { "Other ways to the same data" }
         p.soft {
             "From the samples of the same session. RMS of the log ratio in the interior and at grazing angles, \
-             cosine-weighted error, mean ΔE2000 of a rendered sphere; first against the dense measurement"
+             cosine-weighted error, mean ΔE00 of a rendered sphere; first against the dense measurement"
             @if has_truth { ", then against the truth" } ". Ways marked * were computed at a share of the cells."
         }
         div.wide { table {
@@ -27,7 +27,7 @@ pub fn section(rivals: Option<&Rivals>, figure: Option<String>) -> Markup {
                 th.num { "interior" } th.num { "grazing" } th.num { "cos" } th.num { "ΔE" }
                 @if has_truth { th.num { "interior" } th.num { "grazing" } th.num { "cos" } th.num { "ΔE" } }
             } }
-            tbody { @for row in &rivals.rows { (table_row(row, has_truth)) } }
+            tbody { @for row in &baselines.rows { (table_row(row, has_truth)) } }
         } }
         @if let Some(uri) = figure {
             figure.chart {
@@ -41,7 +41,7 @@ pub fn section(rivals: Option<&Rivals>, figure: Option<String>) -> Markup {
     }
 }
 
-fn table_row(row: &Rival, has_truth: bool) -> Markup {
+fn table_row(row: &BaselineRow, has_truth: bool) -> Markup {
     html! {
         tr {
             td { (row.name) @if row.is_partial { "*" } " " span.soft { (row.what) } }
@@ -76,20 +76,20 @@ fn figures(figures: Option<&Figures>, is_partial: bool) -> Markup {
 
 /// Pixels a side of the pictures in the figure.
 const PX: usize = 220;
-/// Elevations of its slice, degrees: the paper's.
+/// Polar angles of its slice, degrees: the paper's.
 const SLICE_DEG: f64 = 74.0;
 /// Directional lights that stand for the sky, as in the paper.
 const SKY_LIGHTS: usize = 512;
 
 /// The pictures of one table: the slice over both azimuths, then three renders.
-pub struct Row {
+pub struct BaselinePictures {
     name: String,
     slice: Vec<[f32; 3]>,
     pictures: [Picture; 3],
 }
 
 /// Draws what stands in a row of the figure.
-pub fn draw_row(name: &str, dense: &DenseBrdf) -> Row {
+pub fn draw_baseline(name: &str, dense: &DenseBrdf) -> BaselinePictures {
     let brdf = Tabulated::new(dense);
     let sky = Environment::sky().lights(SKY_LIGHTS);
     let slice = (0..PX * PX)
@@ -103,7 +103,7 @@ pub fn draw_row(name: &str, dense: &DenseBrdf) -> Row {
     let draw = |shape: fn(&dyn Brdf, &[Light], usize, usize) -> Picture, lights: &[Light]| {
         shape(&brdf, lights, PX, 1).with_smooth_outline()
     };
-    Row {
+    BaselinePictures {
         name: name.to_owned(),
         slice,
         pictures: [
@@ -115,7 +115,7 @@ pub fn draw_row(name: &str, dense: &DenseBrdf) -> Row {
 }
 
 /// The figure, as an SVG by itself; every column at the exposure of its first row.
-pub fn figure(rows: &[Row]) -> String {
+pub fn figure(rows: &[BaselinePictures]) -> String {
     const SIDE: f64 = 200.0;
     const LEFT: f64 = 104.0;
     const TOP: f64 = 30.0;
@@ -187,7 +187,10 @@ mod tests {
     fn the_figure_has_a_slice_and_three_pictures_a_row() {
         let grid = Grid::with_step_deg(15.0).unwrap();
         let dense = DenseBrdf::tabulate(grid, &Kurt::two_thread_fabric());
-        let rows = [draw_row("dense", &dense), draw_row("kurt2", &dense)];
+        let rows = [
+            draw_baseline("dense", &dense),
+            draw_baseline("kurt2", &dense),
+        ];
         let drawn = figure(&rows);
         assert_eq!(drawn.matches("<image").count(), 8);
         assert!(drawn.contains(">dense<") && drawn.contains(">kurt2<"));

@@ -1,0 +1,111 @@
+//! What a file format must bring along: its names, and the functions that read and write it.
+//!
+//! A new format is one file that defines a [`Format`], and one row in [`crate::table`].
+
+use crate::FileError;
+use gonia_brdf::interpolate::{ByRows, ErrorBars};
+use gonia_brdf::progress::Progress;
+use gonia_brdf::{Brdf, Grid, Sample};
+use gonia_rig::{DenseFile, Scale};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A file format of dense BRDFs, of samples, or of other people's measurements.
+pub(crate) struct Format {
+    /// Its name, for messages.
+    pub name: &'static str,
+    /// The endings of its files in lower case, without the dot; the first one is recommended.
+    pub endings: &'static [&'static str],
+    /// What each of its files begins with; empty where the first bytes tell nothing.
+    pub magic: &'static [u8],
+    /// What its files hold.
+    pub content: Content,
+}
+
+/// What the files of a format hold.
+pub(crate) enum Content {
+    /// A dense BRDF on gonia's grid.
+    Dense(DenseFormat),
+    /// Samples.
+    Samples(SampleFormat),
+    /// Another group's measurement, to be imported.
+    Foreign(ForeignFormat),
+}
+
+/// How a dense BRDF is read and written.
+pub(crate) struct DenseFormat {
+    /// Reads a file whole.
+    pub read: fn(&Path) -> Result<DenseFile, FileError>,
+    /// Opens a file of which a few cells are wanted; `None` for a file that must be read whole.
+    pub open: fn(&Path) -> Result<Option<Box<dyn CellReader>>, FileError>,
+    /// Absent where the format is only read.
+    pub write: Option<DenseWriter>,
+}
+
+/// The ways to write a dense BRDF.
+pub(crate) struct DenseWriter {
+    /// From memory.
+    pub whole: fn(&Path, DenseFile) -> Result<DenseFile, FileError>,
+    /// Row by row, as they are made.
+    pub by_rows: WriteRows,
+    /// The standard errors that belong to it.
+    pub error_bars: WriteErrorBars,
+}
+
+/// See [`crate::dense::write_dense_by_rows`].
+pub(crate) type WriteRows = fn(
+    &Path,
+    Grid,
+    &ByRows<'_>,
+    Scale,
+    &BTreeMap<String, String>,
+    &Progress<'_>,
+) -> Result<(), FileError>;
+
+/// See [`crate::dense::write_error_bars`].
+pub(crate) type WriteErrorBars =
+    fn(&Path, Grid, ErrorBars, Scale, &BTreeMap<String, String>) -> Result<(), FileError>;
+
+/// A file open for reading single cells.
+pub(crate) trait CellReader: Send {
+    /// The grid.
+    fn grid(&self) -> Grid;
+
+    /// The value (R, G, B) of a cell by the indices of its light and view directions.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or the value is NaN or infinite.
+    fn cell(&self, light: usize, view: usize) -> Result<[f32; 3], FileError>;
+}
+
+/// How samples are read and written.
+pub(crate) struct SampleFormat {
+    /// Reads a file whole.
+    pub read: fn(&Path) -> Result<Vec<Sample>, FileError>,
+    /// Writes a file whole.
+    pub write: fn(&Path, &[Sample]) -> Result<(), FileError>,
+}
+
+/// A format of another group, which `gonia import` reads.
+pub struct ForeignFormat {
+    /// Whose format it is and its ending: `UTIA .bin`.
+    pub name: &'static str,
+    /// What its files hold, and how they are read.
+    pub content: ForeignContent,
+}
+
+/// What a file of another group holds.
+pub enum ForeignContent {
+    /// A BRDF that has a value for every pair of directions.
+    Brdf {
+        /// Whether its values are 1/sr.
+        scale: Scale,
+        /// Reads a file, which may fail with one line that names it.
+        read: fn(&Path) -> Result<Box<dyn Brdf>, FileError>,
+    },
+    /// Samples, with directions that were not measured.
+    Samples {
+        /// Reads a file, which may fail with one line that names it.
+        read: fn(&Path) -> Result<Vec<Sample>, FileError>,
+    },
+}

@@ -1,0 +1,140 @@
+//! A row of a sample file: the names of its columns, and what a row may hold.
+
+use gonia_brdf::{Sample, direction::wrap_deg};
+
+/// The names of the columns; the last one is optional.
+pub(super) const COLUMNS: [&str; 8] = [
+    "theta_i", "phi_i", "theta_v", "phi_v", "r", "g", "b", "frame",
+];
+
+/// The largest frame number that float32 holds exactly, with all numbers below it.
+pub(super) const LAST_FRAME: f32 = 16_777_216.0;
+
+/// Whether any sample says which frame it came from.
+pub(super) fn have_frames(samples: &[Sample]) -> bool {
+    samples
+        .iter()
+        .any(|sample| sample.frame != Sample::NO_FRAME)
+}
+
+/// A frame number as it stands in a file.
+pub(super) fn frame_in_file(frame: u32) -> f32 {
+    if frame == Sample::NO_FRAME {
+        -1.0
+    } else {
+        frame as f32
+    }
+}
+
+/// What is wrong with a row.
+pub(super) struct BadRow {
+    pub problem: String,
+    pub remedy: &'static str,
+}
+
+/// Checks the numbers of a row and wraps its azimuths. `row` has 7 or 8 columns.
+pub(super) fn sample_from_row(row: &[f32]) -> Result<Sample, BadRow> {
+    // The sum of finite numbers is finite, save for ones far beyond every value of a BRDF.
+    let sum: f32 = row.iter().take(7).sum();
+    let polar_angles = 0.0..=90.0;
+    let sound = sum.is_finite() && polar_angles.contains(&row[0]) && polar_angles.contains(&row[2]);
+    if !sound {
+        return Err(explain(row));
+    }
+    let frame = match row.get(7) {
+        None => Sample::NO_FRAME,
+        Some(&-1.0) => Sample::NO_FRAME,
+        Some(&f) if f.fract() == 0.0 && (0.0..=LAST_FRAME).contains(&f) => f as u32,
+        Some(&f) => {
+            return Err(BadRow {
+                problem: format!("frame {f} is no number of a frame"),
+                remedy: "give whole numbers from 0 to 16777216, or -1 where it is unknown",
+            });
+        }
+    };
+    Ok(Sample {
+        theta_i_deg: row[0],
+        phi_i_deg: wrapped(row[1]),
+        theta_v_deg: row[2],
+        phi_v_deg: wrapped(row[3]),
+        rgb: [row[4], row[5], row[6]],
+        frame,
+    })
+}
+
+fn wrapped(phi: f32) -> f32 {
+    if (0.0..360.0).contains(&phi) {
+        return phi;
+    }
+    let phi = wrap_deg(f64::from(phi)) as f32;
+    // Just below 360 rounds to 360 in single precision.
+    if phi >= 360.0 { 0.0 } else { phi }
+}
+
+#[cold]
+fn explain(row: &[f32]) -> BadRow {
+    let not_finite = row
+        .iter()
+        .zip(COLUMNS)
+        .find(|(value, _)| !value.is_finite());
+    if let Some((value, name)) = not_finite {
+        return BadRow {
+            problem: format!("{name} is {value}"),
+            remedy: "remove the row or mend its value",
+        };
+    }
+    let too_far = [0, 2]
+        .into_iter()
+        .find(|c| !(0.0..=90.0).contains(&row[*c]));
+    match too_far {
+        Some(c) => BadRow {
+            problem: format!("{} {} is not a polar angle", COLUMNS[c], row[c]),
+            remedy: "give degrees from the normal, from 0 to 90",
+        },
+        None => BadRow {
+            problem: "its values are beyond all measure".into(),
+            remedy: "check the units: degrees, and BRDF values in 1/sr",
+        },
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub fn some_samples(n: u32) -> Vec<Sample> {
+        (0..n)
+            .map(|k| Sample {
+                theta_i_deg: (k % 90) as f32 + 0.125,
+                phi_i_deg: (k % 360) as f32,
+                theta_v_deg: (k % 75) as f32,
+                phi_v_deg: (k % 359) as f32 + 0.5,
+                rgb: [0.1 * k as f32, 1.0 / (1.0 + k as f32), -0.01],
+                frame: k / 1225,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn azimuths_wrap_and_bad_rows_say_which_column() {
+        let row = [10.0, -90.0, 20.0, 720.0, 1.0, 1.0, 1.0, 3.0];
+        let sample = sample_from_row(&row).ok().unwrap();
+        assert_eq!(
+            (sample.phi_i_deg, sample.phi_v_deg, sample.frame),
+            (270.0, 0.0, 3)
+        );
+        assert_eq!(wrapped(-1e-9), 0.0);
+        for (column, value, said) in [
+            (0, 90.5, "theta_i 90.5 is not a polar angle"),
+            (2, -0.5, "theta_v -0.5 is not a polar angle"),
+            (1, f32::INFINITY, "phi_i is inf"),
+            (5, f32::NAN, "g is NaN"),
+            (7, 1.5, "frame 1.5 is no number of a frame"),
+            (7, f32::NAN, "frame NaN is no number of a frame"),
+        ] {
+            let mut bad = row;
+            bad[column] = value;
+            assert_eq!(sample_from_row(&bad).err().unwrap().problem, said);
+        }
+    }
+}

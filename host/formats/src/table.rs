@@ -1,0 +1,99 @@
+//! The table of all formats, and how a file's format is recognised.
+
+use crate::format::{Content, Format};
+use crate::{FileError, dense_exr, merl, ngan, samples_csv, samples_npy, utia};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Every format. The first one of each kind is written where a name has no known ending.
+static FORMATS: [&Format; 6] = [
+    &dense_exr::FORMAT,
+    &samples_npy::FORMAT,
+    &samples_csv::FORMAT,
+    &utia::FORMAT,
+    &merl::FORMAT,
+    &ngan::FORMAT,
+];
+
+/// The formats of a kind, in the order of the table.
+pub(super) fn formats(is_wanted: fn(&Content) -> bool) -> impl Iterator<Item = &'static Format> {
+    FORMATS
+        .into_iter()
+        .filter(move |format| is_wanted(&format.content))
+}
+
+/// The format of a file that exists: by its first bytes, else by its ending.
+///
+/// # Errors
+/// When neither tells the format and the file cannot be read.
+pub(super) fn format_of_file(path: &Path) -> Result<Option<&'static Format>, FileError> {
+    let start = first_bytes(path);
+    let is_begun_so = |format: &&Format| {
+        let start = start.as_deref().unwrap_or_default();
+        !format.magic.is_empty() && start.starts_with(format.magic)
+    };
+    let format = FORMATS.into_iter().find(is_begun_so);
+    match (format.or_else(|| format_of_name(path)), start) {
+        (Some(format), _) => Ok(Some(format)),
+        (None, Ok(_)) => Ok(None),
+        (None, Err(error)) => Err(FileError::reading(path, &error)),
+    }
+}
+
+/// The format that a file of this name has, by its ending in either case.
+pub(super) fn format_of_name(path: &Path) -> Option<&'static Format> {
+    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    FORMATS
+        .into_iter()
+        .find(|format| format.endings.contains(&ending.as_str()))
+}
+
+/// The endings of a kind, as a remedy lists them: `.npy or .csv`.
+pub(super) fn endings(is_wanted: fn(&Content) -> bool) -> String {
+    listed(formats(is_wanted).map(|format| format!(".{}", format.endings[0])))
+}
+
+/// A list as people write it, the last two parted by "or".
+pub(super) fn listed(words: impl Iterator<Item = String>) -> String {
+    let mut words: Vec<String> = words.collect();
+    match words.pop() {
+        Some(last) if words.is_empty() => last,
+        Some(last) => format!("{} or {last}", words.join(", ")),
+        None => String::new(),
+    }
+}
+
+/// The first bytes of an ordinary file; none of a pipe, which can be read only once.
+fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let kind = std::fs::metadata(path)?;
+    if kind.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    let longest = FORMATS.iter().map(|format| format.magic.len()).max();
+    let mut bytes = Vec::new();
+    if kind.is_file() {
+        let file = File::open(path)?;
+        file.take(longest.unwrap_or(0) as u64)
+            .read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_formats_share_an_ending_or_first_bytes() {
+        for (k, format) in FORMATS.iter().enumerate() {
+            for other in &FORMATS[..k] {
+                assert!(format.endings.iter().all(|e| !other.endings.contains(e)));
+                let (a, b) = (format.magic, other.magic);
+                let differ = !a.starts_with(b) && !b.starts_with(a);
+                assert!(a.is_empty() || b.is_empty() || differ, "{}", format.name);
+            }
+            assert!(!format.endings.is_empty() && !format.name.is_empty());
+        }
+    }
+}
