@@ -9,7 +9,7 @@
 use gonia_brdf::direction::{angle_between, local_direction};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::{IdealLight, Registrar, Registration, SamplingGrid, State};
+use gonia_imaging::{IdealLight, Registrar, Registration, RegistrationState, SamplingGrid};
 use gonia_rig::{CameraModel, CameraShift, Frame, Rig};
 use gonia_sim::scene::{Noise, Scene, SceneGeometry, Surface, true_brdf};
 use std::path::{Path, PathBuf};
@@ -378,7 +378,7 @@ fn hough() {
                     let turn = f64::from(k) * 2.4;
                     let reading = pose(a, b, c + off * turn.cos(), d + off * turn.sin());
                     let found = registrar.register(&frame, reading);
-                    locked += usize::from(found.state == State::Locked);
+                    locked += usize::from(found.state == RegistrationState::Locked);
                     if k == 4 {
                         times.push(median_ms(|| registrar.register(&frame, reading)));
                     }

@@ -8,7 +8,7 @@
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
 use gonia_formats::frame_exr::{read_frame, write_frame};
-use gonia_imaging::occlusion::find_occlusion;
+use gonia_imaging::find_occlusion;
 use gonia_imaging::{Registrar, SamplingGrid};
 use gonia_rig::{Frame, Rig};
 use gonia_sim::scene::{Scene, SceneGeometry, Surface};

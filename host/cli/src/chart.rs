@@ -4,7 +4,7 @@ use crate::progress::Progress;
 use crate::{chart_motion, table};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Bins, Grid, Sample};
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::samples::read_samples;
 use gonia_formats::{check_writable, write_whole_bytes};
 use gonia_pipeline::chart;

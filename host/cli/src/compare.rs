@@ -1,7 +1,7 @@
 //! `gonia compare`: one dense BRDF against another.
 
 use anyhow::Result;
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::write_whole_bytes;
 use gonia_pipeline as evaluate;
 use gonia_pipeline::compare::Table;

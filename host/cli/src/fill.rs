@@ -11,8 +11,8 @@ use gonia_brdf::interpolate::{
 };
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use gonia_formats::check_writable;
-use gonia_formats::dense_exr::{write_dense, write_dense_by_rows};
-use gonia_formats::error_exr::write_error_bars;
+use gonia_formats::dense::write_error_bars;
+use gonia_formats::dense::{write_dense, write_dense_by_rows};
 use gonia_formats::samples::read_samples_of_all;
 use gonia_rig::{DenseFile, Scale};
 use std::path::{Path, PathBuf};

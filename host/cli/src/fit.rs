@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{self, Cell, Family, Loss, Settings};
 use gonia_brdf::{Bins, DenseBrdf};
 use gonia_formats::check_writable;
-use gonia_formats::dense_exr::{read_dense, write_dense};
+use gonia_formats::dense::{read_dense, write_dense};
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::samples::read_samples;
 use gonia_pipeline as evaluate;

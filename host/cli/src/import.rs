@@ -3,15 +3,14 @@
 use crate::progress::Progress;
 use crate::provenance::of_this_program;
 use crate::table::count;
-use anyhow::{Context, Result, bail};
-use gonia_brdf::{Brdf, DenseBrdf, Grid};
-use gonia_formats::dense_exr::write_dense;
-use gonia_formats::merl::read_merl;
-use gonia_formats::ngan::read_ngan;
+use anyhow::{Context, Result};
+use gonia_brdf::{Brdf, DenseBrdf, Grid, Sample};
+use gonia_formats::FileError;
+use gonia_formats::dense::{check_dense_name, write_dense};
+use gonia_formats::foreign::{ForeignContent, ForeignFormat, foreign_format};
 use gonia_formats::samples::{check_sample_name, write_samples};
-use gonia_formats::utia::read_utia;
 use gonia_rig::{DenseFile, Scale};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Brings a material of the UTIA database (.bin, anisotropic) or of MERL (.binary, isotropic) onto
 /// gonia's grid, so that every other command can judge, fit and draw it; one of Ngan, Durand and
@@ -35,33 +34,20 @@ impl Import {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let grid = Grid::with_step_deg(self.step).context("--step")?;
-        let extension = self
-            .material
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy();
-        if extension == "dat" {
-            return self.import_samples();
+        let ForeignFormat { name, content } = foreign_format(&self.material)?;
+        match content {
+            ForeignContent::Brdf { scale, read } => {
+                self.import_brdf(grid, name, *scale, read(&self.material)?.as_ref())
+            }
+            ForeignContent::Samples { read } => self.import_samples(*read),
         }
-        let (model, format, scale): (Box<dyn Brdf>, _, _) = match extension.as_ref() {
-            "bin" => (
-                Box::new(read_utia(&self.material)?),
-                "UTIA .bin",
-                Scale::Relative,
-            ),
-            "binary" => (
-                Box::new(read_merl(&self.material)?),
-                "MERL .binary",
-                Scale::Absolute,
-            ),
-            _ => bail!(
-                "{}: neither .bin (UTIA), .binary (MERL) nor .dat (Ngan, Durand, Matusik); give other samples to gonia fill as CSV",
-                self.material.display()
-            ),
-        };
+    }
+
+    fn import_brdf(&self, grid: Grid, format: &str, scale: Scale, model: &dyn Brdf) -> Result<()> {
+        check_dense_name(&self.output)?;
         let mut progress = Progress::new();
         let brdf = progress.stage("bringing it onto the grid", |_| {
-            anyhow::Ok(DenseBrdf::tabulate(grid, model.as_ref()))
+            anyhow::Ok(DenseBrdf::tabulate(grid, model))
         })?;
         let mut provenance = of_this_program();
         provenance.insert(
@@ -78,10 +64,11 @@ impl Import {
         )?;
         Ok(())
     }
-    fn import_samples(&self) -> Result<()> {
+
+    fn import_samples(&self, read: fn(&Path) -> Result<Vec<Sample>, FileError>) -> Result<()> {
         check_sample_name(&self.output)?;
         let mut progress = Progress::new();
-        let samples = progress.stage("reading the bins", |_| read_ngan(&self.material))?;
+        let samples = progress.stage("reading the bins", |_| read(&self.material))?;
         write_samples(&self.output, &samples)?;
         println!(
             "{} bins hold a measurement; gonia fill {} makes them dense",

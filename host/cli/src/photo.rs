@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use crate::table;
 
 use anyhow::{Result, bail};
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::photo::read_photo;
 use gonia_formats::{check_writable, write_whole_bytes};
 use gonia_render as render;

@@ -5,8 +5,8 @@ use crate::table;
 use anyhow::{Result, bail};
 use gonia_acquire::session::SessionFolder;
 use gonia_formats::samples::write_samples;
-use gonia_formats::summary::{FrameCounts, Refused};
 use gonia_formats::{CaptureFolder, FileError, check_writable};
+use gonia_formats::{FrameCounts, Refused};
 use gonia_pipeline::process;
 use gonia_pipeline::process::{
     Compensation, FrameSource, Hidden, Masks, Outcome, ProcessError, Processed, Stage,

@@ -1,6 +1,6 @@
 //! Says which stage a command is in, and how long it still takes.
 
-use gonia_formats::summary::Stage;
+use gonia_formats::Stage;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Direction;
-use gonia_formats::dense_exr::DenseLookup;
+use gonia_formats::dense::DenseLookup;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 

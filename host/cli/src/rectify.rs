@@ -5,7 +5,7 @@ use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::{CaptureFolder, FileError, check_writable, write_whole_bytes};
 use gonia_imaging::hdr::Radiance;
 use gonia_imaging::rectify::{View, rectify, rectify_variance};
-use gonia_imaging::{Registrar, Registration, State};
+use gonia_imaging::{Registrar, Registration, RegistrationState};
 use gonia_pipeline::bracket::load_bracket;
 use gonia_render::{png, tone};
 use gonia_rig::{Frame, Role};
@@ -153,7 +153,7 @@ impl Rectify {
     fn register(&self, folder: &CaptureFolder, frame: &Frame) -> Result<Registration> {
         let registration = Registrar::new(folder.rig()).register(frame, self.row(folder)?.pose);
         match registration.state {
-            State::Locked => println!(
+            RegistrationState::Locked => println!(
                 "registered    by {} lines to {:.3} px, blur {:.2} px, camera {:+.4}, {:+.4} degrees from its reading (theta, phi)",
                 registration.lines_found,
                 registration.residual_px,
@@ -161,7 +161,7 @@ impl Rectify {
                 registration.pose_offset.theta_deg,
                 registration.pose_offset.phi_deg
             ),
-            State::FellBack(reason) => println!("registered    by its pose: {reason}"),
+            RegistrationState::FellBack(reason) => println!("registered    by its pose: {reason}"),
         }
         Ok(registration)
     }

@@ -4,7 +4,7 @@ use crate::fill::folder_of;
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Brdf;
-use gonia_formats::dense_exr::read_dense;
+use gonia_formats::dense::read_dense;
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::photo::read_photo;
 use gonia_formats::{check_writable, write_whole_bytes};

@@ -8,8 +8,8 @@ use anyhow::{Context, Result, bail};
 use gonia_brdf::cellwise::CellSettings;
 use gonia_brdf::fit::{Family, Settings as FitSettings, draw};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
-use gonia_formats::dense_exr::{read_dense, write_dense};
-use gonia_formats::rivals_toml::{Rival, Rivals as Comparison};
+use gonia_formats::baselines_toml::{BaselineRow, BaselineTable as Comparison};
+use gonia_formats::dense::{read_dense, write_dense};
 use gonia_formats::samples::read_samples;
 use gonia_formats::write_whole_bytes;
 use gonia_pipeline as evaluate;
@@ -17,8 +17,8 @@ use gonia_pipeline::compare::Table;
 use gonia_pipeline::rivals::{centres, check_grid, coarse, fill_check_cells, measure_on_strips};
 use gonia_pipeline::{Options, Side};
 use gonia_render::Tabulated;
-use gonia_report::folder::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
-use gonia_report::rivals::{Row, draw_row, figure};
+use gonia_report::baselines::{BaselinePictures, draw_baseline, figure};
+use gonia_report::files::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
 use gonia_rig::{DenseFile, Figures, Scale, Stratum};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -138,7 +138,7 @@ impl Rivals {
             );
         }
         let mut comparison = Comparison::default();
-        comparison.rows.push(Rival {
+        comparison.rows.push(BaselineRow {
             name: "dense".into(),
             what: "all samples, gonia's interpolation".into(),
             numbers: samples.len() as u64,
@@ -147,7 +147,7 @@ impl Rivals {
             against_truth: session.against_truth(&session.dense.brdf, "dense")?,
             is_partial: false,
         });
-        let mut rows: Vec<Row> = vec![draw_row("dense", &session.dense.brdf)];
+        let mut rows: Vec<BaselinePictures> = vec![draw_baseline("dense", &session.dense.brdf)];
         if !self.without_paper {
             let (found, table) = session.paper(&samples, "paper", &mut progress)?;
             comparison.rows.push(found);
@@ -164,8 +164,8 @@ impl Rivals {
             session.write(path("sparse-paper.exr"), table, what)?;
         }
         let (rival, sparse) = session.filled(central, "sparse", what, &mut progress)?;
-        comparison.rows.push(Rival { numbers, ..rival });
-        rows.push(draw_row("sparse", &sparse));
+        comparison.rows.push(BaselineRow { numbers, ..rival });
+        rows.push(draw_baseline("sparse", &sparse));
         session.write(path("sparse.exr"), sparse, "central samples only")?;
 
         // Strips see the material itself: the truth, or the best that is known of it.
@@ -174,7 +174,7 @@ impl Rivals {
         let numbers = strips.len() as u64;
         let what = "simulated: 20 strips on a cylinder, with its noise";
         let (rival, strips) = session.filled(strips, "strips", what, &mut progress)?;
-        comparison.rows.push(Rival { numbers, ..rival });
+        comparison.rows.push(BaselineRow { numbers, ..rival });
         session.write(path("strips.exr"), strips, "simulated strips on a cylinder")?;
 
         for family in [Family::Kurt { lobes: 2 }, Family::Sadeghi { scaled: false }] {
@@ -193,7 +193,7 @@ impl Rivals {
                 &mut progress,
             )?;
             let note = &result.note;
-            comparison.rows.push(Rival {
+            comparison.rows.push(BaselineRow {
                 name: note.model.clone(),
                 what: if note.converged {
                     "fitted to the dense measurement".into()
@@ -206,7 +206,7 @@ impl Rivals {
                 against_truth: session.against_truth(&result.dense, &note.model)?,
                 is_partial: false,
             });
-            rows.push(draw_row(&note.model, &result.dense));
+            rows.push(draw_baseline(&note.model, &result.dense));
             let name = format!("{}.exr", note.model);
             write_fit(&path(&name), result, session.dense.scale)?;
         }
@@ -227,7 +227,7 @@ impl Session {
         samples: &[Sample],
         name: &str,
         progress: &mut Progress,
-    ) -> Result<(Rival, DenseBrdf)> {
+    ) -> Result<(BaselineRow, DenseBrdf)> {
         let grid = check_grid(self.grid).with_context(|| {
             format!(
                 "{DENSE}: steps of {} degrees have no coarser grid to check; use --without-paper",
@@ -255,7 +255,7 @@ impl Session {
             (&table, name, Scale::Absolute),
             (&other, "dense", Scale::Absolute),
         )?;
-        let rival = Rival {
+        let rival = BaselineRow {
             name: name.to_owned(),
             what: format!(
                 "the paper's method, at steps of {}°; time for all cells extrapolated",
@@ -277,7 +277,7 @@ impl Session {
         name: &str,
         what: &str,
         progress: &mut Progress,
-    ) -> Result<(Rival, DenseBrdf)> {
+    ) -> Result<(BaselineRow, DenseBrdf)> {
         let how = How {
             step: self.grid.step_deg(),
             preset: PresetArgument::Default,
@@ -289,7 +289,7 @@ impl Session {
         let start = Instant::now();
         let filled = fill(samples, grid, settings, false, progress).context(name.to_owned())?;
         let seconds = start.elapsed().as_secs_f64();
-        let rival = Rival {
+        let rival = BaselineRow {
             name: name.to_owned(),
             what: what.to_owned(),
             numbers: 0,

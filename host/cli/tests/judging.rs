@@ -7,10 +7,10 @@ use common::{gonia, gonia_ok, text};
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::model::{Brdf, Kurt};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
-use gonia_formats::dense_exr::{read_dense, write_dense};
+use gonia_formats::baselines_toml::BaselineTable;
+use gonia_formats::dense::{read_dense, write_dense};
 use gonia_formats::fit_toml::FitNote;
 use gonia_formats::frame_exr::{read_frame, write_frame};
-use gonia_formats::rivals_toml::Rivals;
 use gonia_formats::samples::write_samples;
 use gonia_rig::{DenseFile, Frame, Scale};
 use std::collections::BTreeMap;
@@ -274,7 +274,7 @@ fn rivals_are_made_judged_and_shown_in_the_report() {
             "4",
         ];
         gonia_ok(&[&arguments[..], more].concat(), "");
-        Rivals::read(&path("rivals.toml")).unwrap()
+        BaselineTable::read(&path("rivals.toml")).unwrap()
     };
     // The paper's method takes a second for a thousand cells.
     let found = made(&["--step", "20"]);

@@ -8,7 +8,7 @@ use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::directions;
 use gonia_brdf::model::{Brdf, Kurt};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
-use gonia_formats::dense_exr::{read_dense, write_dense};
+use gonia_formats::dense::{read_dense, write_dense};
 use gonia_formats::samples::write_samples;
 use gonia_rig::{DenseFile, Scale};
 use std::path::Path;

@@ -354,7 +354,7 @@ mod tests {
     use super::*;
     use gonia_acquire::session::PoseDone;
     use gonia_brdf::Direction;
-    use gonia_imaging::{PoseOffset, Reason};
+    use gonia_imaging::{PoseOffset, RegistrationFailure};
     use gonia_pipeline::process::{FrameReport, Refusal};
     use serde_json::Value;
 
@@ -430,7 +430,7 @@ mod tests {
         assert_eq!(whole["done"], 1);
 
         done(&mut board, 2, Outcome::Locked);
-        let lost = Reason::LinesMissing { found: 1 };
+        let lost = RegistrationFailure::LinesMissing { found: 1 };
         done(&mut board, 3, Outcome::Refused(Refusal::NotTheTarget(lost)));
         board.hear(&Told::GivenUp {
             index: 4,

@@ -10,10 +10,10 @@
 mod plan;
 
 use anyhow::{Context, Result};
-use gonia_formats::dense_exr::write_dense;
+use gonia_brdf::{DenseBrdf, Grid};
+use gonia_formats::dense::write_dense;
 use gonia_formats::samples::write_samples;
 use gonia_rig::{DenseFile, Scale};
-use gonia_brdf::{DenseBrdf, Grid};
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -222,6 +222,6 @@ mod tests {
             (250, None, Some(0.0))
         );
         assert!((part.cos_error_p99 - 0.2475 / 2.0).abs() < 2e-3);
-        assert_eq!(sums.figures(Stratum::Void, false), None);
+        assert_eq!(sums.figures(Stratum::Unmeasured, false), None);
     }
 }

@@ -8,8 +8,8 @@
 use gonia_brdf::direction::{angle_between, local_direction};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::occlusion::find_occlusion;
-use gonia_imaging::{LeftOut, Reason, Registrar, SamplingGrid};
+use gonia_imaging::find_occlusion;
+use gonia_imaging::{LeftOut, Registrar, RegistrationFailure, SamplingGrid};
 use gonia_pipeline::process::{Outcome, Refusal};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig};
 use gonia_sim::scene::{Scene, SceneGeometry, Surface};
@@ -379,11 +379,13 @@ fn look(
     if let Outcome::Refused(refusal) = outcome {
         row.refused += 1;
         let why = match refusal {
-            Refusal::NotTheTarget(Reason::LinesMissing { .. }) => "too few lines",
-            Refusal::NotTheTarget(Reason::WrongLayout { .. }) => {
+            Refusal::NotTheTarget(RegistrationFailure::LinesMissing { .. }) => "too few lines",
+            Refusal::NotTheTarget(RegistrationFailure::WrongLayout { .. }) => {
                 "lines not laid out as the target's"
             }
-            Refusal::NotTheTarget(Reason::FarFromPose { .. }) => "lines far from the pose",
+            Refusal::NotTheTarget(RegistrationFailure::FarFromPose { .. }) => {
+                "lines far from the pose"
+            }
             Refusal::NoReference => "no reference",
         };
         if !row.why.contains(&why) {

@@ -14,7 +14,7 @@
 //! | 4, n | bytes of the mask, and the mask (as in masks.csv); none when nothing was hidden |
 
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::{LeftOut, Mask, PoseOffset, Reason};
+use gonia_imaging::{LeftOut, Mask, PoseOffset, RegistrationFailure};
 use gonia_pipeline::process::{FrameReport, Outcome, Refusal, SampledFrame, SampledPoint};
 use gonia_rig::Role;
 
@@ -42,12 +42,12 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
     };
     let (why, a, b) = match reason {
         None => (0, 0.0, 0.0),
-        Some(Reason::LinesMissing { found }) => (1, found as f64, 0.0),
-        Some(Reason::WrongLayout {
+        Some(RegistrationFailure::LinesMissing { found }) => (1, found as f64, 0.0),
+        Some(RegistrationFailure::WrongLayout {
             misfit_px,
             deviation,
         }) => (2, misfit_px, deviation),
-        Some(Reason::FarFromPose { offset_deg }) => (3, offset_deg, 0.0),
+        Some(RegistrationFailure::FarFromPose { offset_deg }) => (3, offset_deg, 0.0),
     };
     out.extend([outcome, why]);
     let Pose { light, view } = frame.reading;
@@ -104,12 +104,12 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
     let [a, b, residual_px, theta_deg, phi_deg] = bytes.numbers()?;
     let reason = match why {
         0 => None,
-        1 => Some(Reason::LinesMissing { found: a as usize }),
-        2 => Some(Reason::WrongLayout {
+        1 => Some(RegistrationFailure::LinesMissing { found: a as usize }),
+        2 => Some(RegistrationFailure::WrongLayout {
             misfit_px: a,
             deviation: b,
         }),
-        3 => Some(Reason::FarFromPose { offset_deg: a }),
+        3 => Some(RegistrationFailure::FarFromPose { offset_deg: a }),
         _ => return None,
     };
     let outcome = match (outcome, reason) {
@@ -224,15 +224,15 @@ pub(crate) mod tests {
 
     #[test]
     fn a_frame_comes_back_bit_for_bit() {
-        let reason = Reason::WrongLayout {
+        let reason = RegistrationFailure::WrongLayout {
             misfit_px: 1.5,
             deviation: 9.0,
         };
         for outcome in [
             Outcome::Locked,
-            Outcome::FellBack(Reason::LinesMissing { found: 2 }),
+            Outcome::FellBack(RegistrationFailure::LinesMissing { found: 2 }),
             Outcome::Refused(Refusal::NotTheTarget(reason)),
-            Outcome::Refused(Refusal::NotTheTarget(Reason::FarFromPose {
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::FarFromPose {
                 offset_deg: 3.0,
             })),
         ] {

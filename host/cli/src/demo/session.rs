@@ -5,7 +5,7 @@ use anyhow::Result;
 use gonia_acquire::camera::SimulatedCamera;
 use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
 use gonia_brdf::Pose;
-use gonia_formats::summary::{Pointing, Refused};
+use gonia_formats::{Pointing, Refused};
 use gonia_rig::Role;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::rig::SimRig;

@@ -4,9 +4,9 @@ use crate::demo::session::Session;
 use crate::{process, table};
 use gonia_brdf::Grid;
 use gonia_formats::Summary;
-use gonia_formats::summary::{BinCounts, CellCounts, FileNote, PoseCounts};
+use gonia_formats::{BinCounts, CellCounts, FileNote, PoseCounts};
 use gonia_pipeline::process::Processed;
-use gonia_report::folder::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
+use gonia_report::files::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use gonia_rig::CellMask;
 use std::path::Path;
 

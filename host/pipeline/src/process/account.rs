@@ -1,6 +1,6 @@
 //! What became of frames and points.
 
-use gonia_imaging::{LeftOut, PoseOffset, Reason, Registration, State};
+use gonia_imaging::{LeftOut, PoseOffset, Registration, RegistrationFailure, RegistrationState};
 use gonia_rig::Role;
 use std::ops::AddAssign;
 
@@ -25,7 +25,7 @@ pub enum Outcome {
     /// Registered by its marks.
     Locked,
     /// Used at the place its pose predicts, because too little of the marks can be seen.
-    FellBack(Reason),
+    FellBack(RegistrationFailure),
     /// Not used.
     Refused(Refusal),
 }
@@ -35,7 +35,7 @@ pub enum Outcome {
 pub enum Refusal {
     /// It does not show the target where the pose puts it.
     #[error("it does not show the target where its pose puts it: {0}")]
-    NotTheTarget(Reason),
+    NotTheTarget(RegistrationFailure),
     /// No usable frame of the reference was taken at its pose.
     #[error("no usable frame of the reference was taken at its pose")]
     NoReference,
@@ -49,12 +49,14 @@ impl Outcome {
     /// What a registration lets one do with its frame.
     pub fn of(registration: &Registration) -> Self {
         match registration.state {
-            State::Locked => Self::Locked,
+            RegistrationState::Locked => Self::Locked,
             // Some lines are hidden; what is seen agrees with the pose.
-            State::FellBack(reason @ Reason::LinesMissing { found }) if found >= FEWEST_LINES => {
+            RegistrationState::FellBack(reason @ RegistrationFailure::LinesMissing { found })
+                if found >= FEWEST_LINES =>
+            {
                 Self::FellBack(reason)
             }
-            State::FellBack(reason) => Self::Refused(Refusal::NotTheTarget(reason)),
+            RegistrationState::FellBack(reason) => Self::Refused(Refusal::NotTheTarget(reason)),
         }
     }
 }
@@ -180,7 +182,7 @@ mod tests {
                 phi_deg: 0.0,
             },
         };
-        let lost = Outcome::FellBack(Reason::LinesMissing { found: 2 });
+        let lost = Outcome::FellBack(RegistrationFailure::LinesMissing { found: 2 });
         let frames = [
             frame(Outcome::Locked, 0.01),
             frame(Outcome::Locked, -0.03),

@@ -3,7 +3,7 @@
 
 use crate::process::account::{FrameReport, Outcome};
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::occlusion::find_occlusion;
+use gonia_imaging::find_occlusion;
 use gonia_imaging::{LeftOut, Mask, Registrar, Registration, SamplingGrid};
 use gonia_rig::{Frame, FrameRow, Rig};
 
