@@ -43,6 +43,7 @@ fn latch(seq: u32) -> Latch {
 }
 
 /// Every message once, with its packet in hexadecimal. A table, so longer than a function should be.
+// long: a table, the bytes of every message.
 fn golden() -> Vec<(Message, &'static str)> {
     let setting = Setting {
         axis: Axis::Phi,

@@ -82,6 +82,7 @@ struct Row {
 }
 
 /// A table, so longer than a function should be.
+// long: a table, one entry a fault.
 fn rows() -> Vec<Row> {
     let event = |fault, cause, does, codes, end, host| Row {
         fault,

@@ -363,6 +363,7 @@ fn frame_of(case: &Case, scene: &Scene, pose: Pose, map: &Homography) -> Seen {
     }
 }
 
+// long: one frame through the whole chain, each step compared with its truth.
 fn look(
     case: &Case,
     rig: &Rig,
