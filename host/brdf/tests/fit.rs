@@ -23,9 +23,16 @@ const EXPOSURE_NOISE: f64 = 0.01;
 /// A table with noise that each value has by itself.
 fn noisy(model: &dyn Brdf, grid: Grid) -> DenseBrdf {
     let mut planes = DenseBrdf::tabulate(grid, model).into_planes();
-    let mut random = Random::new(1);
-    for value in planes.iter_mut().flatten() {
-        *value *= (1.0 + NOISE * random.normal()) as f32;
+    for (c, plane) in planes.iter_mut().enumerate() {
+        for (cell, value) in plane.iter_mut().enumerate() {
+            let mut x = (3 * cell + c) as u64;
+            x = (x ^ 0x5851_f42d_4c95_7f2d).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            x = (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            x ^= x >> 32;
+            let sum: f64 = (0..4).map(|k| f64::from((x >> (16 * k)) as u16)).sum();
+            let normal = (sum / 65536.0 - 2.0) * 3f64.sqrt();
+            *value *= (1.0 + NOISE * normal) as f32;
+        }
     }
     DenseBrdf::new(grid, planes).unwrap()
 }

@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_smooth_function_is_found_again_between_its_nodes() {
+    fn a_smooth_function_is_found_again_between_its_data() {
         for n in [48, 64, 185] {
             let data = scattered(n);
             let mut block = KrigingBlock::new(&Matern32);
@@ -422,7 +422,7 @@ mod tests {
 
     /// Nodes along the second half's first axis, whose values follow the drift of half/difference
     /// coordinates so many times.
-    fn along_the_trend(times: f32) -> (BlockSettings, Vec<Datum>) {
+    fn along_the_drift(times: f32) -> (BlockSettings, Vec<Datum>) {
         let drift = Coordinates::half_difference(0.5).drift();
         let settings = BlockSettings { drift, ..SETTINGS };
         let data = (0..60)
@@ -437,11 +437,11 @@ mod tests {
     }
 
     #[test]
-    fn a_trend_goes_on_beyond_the_nodes_with_the_slope_that_they_show() {
+    fn a_drift_goes_on_beyond_the_data_with_the_slope_that_they_show() {
         let beyond: Point = [0.0, 0.0, 0.0, 0.68, 0.0, 0.0];
         let middle: Point = [0.0, 0.0, 0.0, 0.52, 0.0, 0.0];
         for times in [0.5, 1.0, 1.5] {
-            let (settings, data) = along_the_trend(times);
+            let (settings, data) = along_the_drift(times);
             let expected = times * settings.drift.at(&beyond);
             let off = |settings: &BlockSettings| {
                 let mut block = KrigingBlock::new(&Matern32);
@@ -458,12 +458,12 @@ mod tests {
 
     #[test]
     fn the_variance_of_a_mean_is_that_of_its_place_and_less_of_several() {
-        let (with_trend, along) = along_the_trend(1.2);
+        let (with_drift, along) = along_the_drift(1.2);
         let place = |x, y| datum(x, y, 1.0).point;
         let cases = [
             (SETTINGS, scattered(60), place(0.9, 0.7), place(-0.9, 0.7)),
             (
-                with_trend,
+                with_drift,
                 along,
                 [0.0, 0.0, 0.0, 0.68, 0.0, 0.0],
                 [0.0, 0.0, 0.0, 0.36, 0.0, 0.0],
@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn duplicates_a_single_node_and_none_give_finite_values() {
+    fn duplicates_a_single_datum_and_none_give_finite_values() {
         let mut block = KrigingBlock::new(&Matern32);
         let same = vec![datum(0.2, 0.1, 1.0); 40];
         block.fit(&same, [0.0; 6], 0.0, &SETTINGS);
@@ -533,7 +533,7 @@ mod tests {
     }
 
     #[test]
-    fn far_from_its_nodes_a_block_does_not_run_away() {
+    fn far_from_its_data_a_block_does_not_run_away() {
         // A slope of 2 over data a tenth apart; the place is thirty radii away.
         let data: Vec<Datum> = (0..20)
             .map(|k| {
