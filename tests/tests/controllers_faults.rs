@@ -5,7 +5,7 @@
 use gonia_acquire::capture::{
     Arms, POINTING_LIMIT_DEG, SessionError, SessionSummary, ShotOutcome, run_session,
 };
-use gonia_acquire::link::{Controller, LinkError};
+use gonia_acquire::link::{ArmController, LinkError};
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
@@ -31,11 +31,11 @@ fn rig_with(events: &[(u64, Fault)]) -> SimRig {
     )
 }
 
-fn light(rig: &SimRig) -> Controller {
-    Controller::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap()
+fn light(rig: &SimRig) -> ArmController {
+    ArmController::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap()
 }
 
-fn homed(rig: &SimRig) -> Controller {
+fn homed(rig: &SimRig) -> ArmController {
     let mut arm = light(rig);
     let ticket = arm.home().unwrap();
     assert_eq!(
@@ -45,7 +45,7 @@ fn homed(rig: &SimRig) -> Controller {
     arm
 }
 
-fn state(arm: &mut Controller) -> State {
+fn state(arm: &mut ArmController) -> State {
     arm.status().unwrap().state
 }
 
@@ -245,7 +245,7 @@ fn power_lost_while_saving_leaves_the_old_settings() {
     let torn = Fault::TornSave { after_bytes: 100 };
     let rig = rig_with(&[(1_000_000, torn)]);
     let mut arm = light(&rig);
-    let set = |arm: &mut Controller, value| arm.set_setting(Axis::Phi, Key::MaxSpeed, value);
+    let set = |arm: &mut ArmController, value| arm.set_setting(Axis::Phi, Key::MaxSpeed, value);
     set(&mut arm, 12_000_000).unwrap();
     arm.save_settings().unwrap();
     arm.rest(2_000_000).unwrap();
@@ -292,7 +292,7 @@ fn a_train_latches_every_pulse_and_refuses_to_fire_outside_the_window() {
     let mut arm = homed(&rig);
     let ticket = arm.move_to([20_000_000, 40_000_000]).unwrap();
     arm.wait(ticket, MINUTE_US).unwrap();
-    arm.arm(train(Trigger::Source)).unwrap();
+    arm.request_trigger(train(Trigger::Source)).unwrap();
     let ticket = arm.fire().unwrap();
     assert_eq!(arm.wait(ticket, MINUTE_US).unwrap().outcome, Outcome::Done);
     let times: Vec<u64> = (0..3).map(|i| arm.latch(i).unwrap().time_us).collect();
@@ -300,7 +300,7 @@ fn a_train_latches_every_pulse_and_refuses_to_fire_outside_the_window() {
     let given: Vec<u64> = rig.triggers().iter().map(|t| t.time_us).collect();
     assert_eq!(given, times);
 
-    arm.arm(train(Trigger::Source)).unwrap();
+    arm.request_trigger(train(Trigger::Source)).unwrap();
     while rig.now_us() < 2 * MINUTE_US + 1000 {
         arm.keep_alive().unwrap();
         arm.rest(100_000).unwrap();
@@ -317,7 +317,7 @@ fn one_arms_emergency_stop_stops_the_other_and_is_cleared_from_its_source() {
     let rig = rig_with(&[]);
     let mut light = homed(&rig);
     let mut camera =
-        Controller::connect(Box::new(rig.port(Arm::Camera)), gonia_protocol::NODE_CAMERA).unwrap();
+        ArmController::connect(Box::new(rig.port(Arm::Camera)), gonia_protocol::NODE_CAMERA).unwrap();
     let homing = camera.home().unwrap();
     camera.poll(homing, 1_000_000).unwrap();
     light.emergency_stop().unwrap();
@@ -363,7 +363,7 @@ fn firmware_of_another_schema_is_named_and_not_moved() {
             0
         }
     }
-    let error = Controller::connect(Box::new(Elsewhere(Vec::new())), NODE_LIGHT)
+    let error = ArmController::connect(Box::new(Elsewhere(Vec::new())), NODE_LIGHT)
         .err()
         .unwrap();
     let line = error.to_string();

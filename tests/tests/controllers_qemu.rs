@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use gonia_acquire::link::{Controller, LinkError, StreamTransport, Transport};
+use gonia_acquire::link::{ArmController, LinkError, StreamTransport, Transport};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{Arm, Outcome, Refusal, State, Trigger};
@@ -135,7 +135,7 @@ struct Seen {
     log: Vec<Option<FaultCode>>,
 }
 
-fn home(arm: &mut Controller) {
+fn home(arm: &mut ArmController) {
     let homing = arm.home().unwrap();
     let end = arm.wait(homing, 2 * MINUTE_US).unwrap();
     assert_eq!(end.outcome, Outcome::Done);
@@ -152,7 +152,7 @@ fn target(i: usize) -> [i32; 2] {
 }
 
 /// Hello was said. Homing, poses, a fault, a train, an emergency stop, homing, poses.
-fn session(arm: &mut Controller) -> Seen {
+fn session(arm: &mut ArmController) -> Seen {
     let refused = arm.move_to([0, 0]);
     let not_homed = matches!(
         refused,
@@ -213,7 +213,7 @@ fn session(arm: &mut Controller) -> Seen {
 }
 
 /// The host falls silent in mid-move: the arm stops by itself, latches, and is cleared.
-fn silence(arm: &mut Controller) {
+fn silence(arm: &mut ArmController) {
     arm.set_setting(Axis::Theta, Key::Lease, 200_000).unwrap();
     arm.move_to([0, -100_000_000]).unwrap();
     arm.rest(1_500_000).unwrap();
@@ -224,14 +224,14 @@ fn silence(arm: &mut Controller) {
     arm.set_setting(Axis::Theta, Key::Lease, 2_000_000).unwrap();
 }
 
-fn train(arm: &mut Controller) -> Vec<([i32; 2], bool)> {
+fn train(arm: &mut ArmController) -> Vec<([i32; 2], bool)> {
     let pulses = [1000, 4000, 16_000];
     let train = Arm {
         trigger: Trigger::Source,
         exposures_us: pulses.into_iter().collect(),
         gap_us: 500,
     };
-    arm.arm(train).unwrap();
+    arm.request_trigger(train).unwrap();
     let fired = arm.fire().unwrap();
     assert_eq!(arm.wait(fired, MINUTE_US).unwrap().outcome, Outcome::Done);
     let latch = |pulse| {
@@ -251,7 +251,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
         wire: transport,
         state: 1,
     };
-    let mut arm = Controller::connect(Box::new(bent), NODE_LIGHT).unwrap();
+    let mut arm = ArmController::connect(Box::new(bent), NODE_LIGHT).unwrap();
     assert_eq!(arm.identity().board.as_str(), "qemu-mps2");
     assert_eq!(arm.identity().firmware, gonia_firmware::VERSION);
     let in_qemu = session(&mut arm);
@@ -266,7 +266,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     let arms = [Bench::quiet_arm_near_home(), Bench::default_arm(2)];
     let rig = SimRig::with_arms(1, FaultPlan::default(), arms);
     let port = Box::new(rig.port(rig::Arm::Light));
-    let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
+    let mut arm = ArmController::connect(port, NODE_LIGHT).unwrap();
     let simulated = session(&mut arm);
     let after = SILENT_AFTER + 1;
     assert_eq!(in_qemu.ends[..after], simulated.ends[..after]);

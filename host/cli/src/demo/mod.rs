@@ -9,7 +9,7 @@ use crate::plan::travelling;
 use crate::progress::Progress;
 use crate::{fill, process};
 use anyhow::{Context, Result, bail};
-use gonia_acquire::camera::SimulatedCamera;
+use gonia_acquire::camera::SimulatedFrames;
 use gonia_brdf::DenseBrdf;
 use gonia_brdf::model::{Kurt, Material};
 use gonia_formats::dense_exr::write_dense;
@@ -92,7 +92,7 @@ impl Demo {
 
         let material = Material::named(&self.material).context("--material")?;
         let truth = material.brdf;
-        let mut camera = SimulatedCamera::new(Scene::new(
+        let mut camera = SimulatedFrames::new(Scene::new(
             SceneGeometry::of_rig(&rig),
             truth.clone(),
             Arc::new(Kurt::white_reference_fabric()),
