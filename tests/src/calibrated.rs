@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use gonia_acquire::capture::Arms;
-use gonia_acquire::link::{Controller, calibrate_axis};
+use gonia_acquire::link::{RemoteController, calibrate_axis};
 use gonia_protocol::settings::{Axis, Key, MEANINGS};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 use gonia_sim::arm::SimulatedArm;
@@ -27,7 +27,7 @@ pub fn rig(seed: u64, faults: FaultPlan) -> (SimRig, Arms) {
     let changed = calibration_of(seed);
     let rig = SimRig::with_arms(seed, faults, arms(seed));
     for (arm, node) in ARMS {
-        let mut controller = Controller::connect(Box::new(rig.port(arm)), node).unwrap();
+        let mut controller = RemoteController::connect(Box::new(rig.port(arm)), node).unwrap();
         for (_, axis, key, value) in changed.iter().filter(|change| change.0 == arm) {
             controller.set_setting(*axis, *key, *value).unwrap();
         }
@@ -58,7 +58,7 @@ fn calibrate_both(seed: u64) -> Changed {
     let rig = SimRig::with_arms(seed, FaultPlan::default(), arms(seed));
     let mut changed = Vec::new();
     for (arm, node) in ARMS {
-        let mut controller = Controller::connect(Box::new(rig.port(arm)), node).unwrap();
+        let mut controller = RemoteController::connect(Box::new(rig.port(arm)), node).unwrap();
         calibrate(&rig, arm, &mut controller);
         for meaning in &MEANINGS {
             for axis in Axis::BOTH {
@@ -86,12 +86,12 @@ fn eccentric_arm(seed: u64) -> SimulatedArm {
     SimulatedArm::new([theta, axis(Axis::Phi, -12.8e6, 0.414)], seed)
 }
 
-fn calibrate(rig: &SimRig, arm: Arm, controller: &mut Controller) {
+fn calibrate(rig: &SimRig, arm: Arm, controller: &mut RemoteController) {
     let theta: Vec<i32> = (0..10).map(|i| i * 9_700_000).collect();
     let phi: Vec<i32> = (0..24).map(|i| -180_000_000 + i * 15_000_000).collect();
     for (axis, stands) in [(Axis::Theta, theta), (Axis::Phi, phi)] {
         let mut n = 0.0;
-        let mut autocollimator = |_: &mut Controller, _| {
+        let mut autocollimator = |_: &mut RemoteController, _| {
             n += 1.0;
             let scatter = AUTOCOLLIMATOR_DEG * f64::sin(n * 2.4);
             Ok(rig.true_deg(arm)[axis.index()] + scatter)

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
-use gonia_acquire::link::{Controller, LinkError, calibrate_axis};
+use gonia_acquire::link::{LinkError, RemoteController, calibrate_axis};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
@@ -42,7 +42,7 @@ enum Cause {
     /// θ of the light arm is built like this.
     Axis(fn(&mut PlantConfig)),
     /// The same, after a person has adjusted it on the test bench.
-    Adjusted(fn(&mut PlantConfig), fn(&SimRig, &mut Controller)),
+    Adjusted(fn(&mut PlantConfig), fn(&SimRig, &mut RemoteController)),
     /// The power goes while the host saves settings.
     TornSave,
     /// The host falls silent during a move.
@@ -387,9 +387,9 @@ fn eccentric(theta: &mut PlantConfig) {
 }
 
 /// As on a test bench: an autocollimator measures where the axis truly is.
-fn calibrate_theta(rig: &SimRig, light: &mut Controller) {
+fn calibrate_theta(rig: &SimRig, light: &mut RemoteController) {
     let stands: Vec<i32> = (0..10).map(|i| i * 9_700_000).collect();
-    let mut autocollimator = |_: &mut Controller, _| Ok(rig.true_deg(Arm::Light)[0]);
+    let mut autocollimator = |_: &mut RemoteController, _| Ok(rig.true_deg(Arm::Light)[0]);
     let fit = calibrate_axis(light, THETA, &stands, false, &mut autocollimator).unwrap();
     assert!(fit.encoder.rms_after_deg < 0.001, "{fit:?}");
 }
@@ -505,7 +505,7 @@ fn run(row: &Row) -> Seen {
 fn session(rig: &SimRig, cause: &Cause) -> End {
     let port = |arm| Box::new(rig.port(arm));
     if let Cause::Adjusted(_, adjust) = cause {
-        let mut light = Controller::connect(port(Arm::Light), NODE_LIGHT).unwrap();
+        let mut light = RemoteController::connect(port(Arm::Light), NODE_LIGHT).unwrap();
         adjust(rig, &mut light);
         light.rest(1_000).unwrap();
     }
@@ -537,7 +537,7 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
             );
         }
         if matches!(cause, Cause::CameraNotReady) && shot.index == 5 {
-            let reason = "camera not ready".to_owned();
+            let reason = "camera not ready".into();
             return Err(SessionError::Taker {
                 index: shot.index,
                 reason,
@@ -571,11 +571,11 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
 }
 
 fn row_calibrates(cause: &Cause) -> bool {
-    matches!(cause, Cause::Adjusted(_, adjust) if std::ptr::fn_addr_eq(*adjust, calibrate_theta as fn(&SimRig, &mut Controller)))
+    matches!(cause, Cause::Adjusted(_, adjust) if std::ptr::fn_addr_eq(*adjust, calibrate_theta as fn(&SimRig, &mut RemoteController)))
 }
 
-fn homed(rig: &SimRig) -> Controller {
-    let mut arm = Controller::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap();
+fn homed(rig: &SimRig) -> RemoteController {
+    let mut arm = RemoteController::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap();
     let ticket = arm.home().unwrap();
     arm.wait(ticket, 240_000_000).unwrap();
     arm
@@ -630,7 +630,7 @@ fn tear_a_save() -> End {
         };
         let rig = SimRig::new(5, plan);
         let port = Box::new(rig.port(Arm::Light));
-        let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
+        let mut arm = RemoteController::connect(port, NODE_LIGHT).unwrap();
         arm.set_setting(Axis::Phi, Key::MaxSpeed, 12_000_000)
             .unwrap();
         arm.save_settings().unwrap();

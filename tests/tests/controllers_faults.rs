@@ -5,7 +5,7 @@
 use gonia_acquire::capture::{
     Arms, POINTING_LIMIT_DEG, SessionError, SessionSummary, ShotOutcome, run_session,
 };
-use gonia_acquire::link::{Controller, LinkError};
+use gonia_acquire::link::{LinkError, RemoteController};
 use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
@@ -33,11 +33,11 @@ fn rig_with(events: &[(u64, Fault)]) -> SimRig {
     )
 }
 
-fn light(rig: &SimRig) -> Controller {
-    Controller::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap()
+fn light(rig: &SimRig) -> RemoteController {
+    RemoteController::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap()
 }
 
-fn homed(rig: &SimRig) -> Controller {
+fn homed(rig: &SimRig) -> RemoteController {
     let mut arm = light(rig);
     let ticket = arm.home().unwrap();
     assert_eq!(
@@ -47,7 +47,7 @@ fn homed(rig: &SimRig) -> Controller {
     arm
 }
 
-fn state(arm: &mut Controller) -> ControllerState {
+fn state(arm: &mut RemoteController) -> ControllerState {
     arm.status().unwrap().state
 }
 
@@ -265,7 +265,7 @@ fn power_lost_while_saving_leaves_the_old_settings() {
     let torn = Fault::TornSave { after_bytes: 100 };
     let rig = rig_with(&[(1_000_000, torn)]);
     let mut arm = light(&rig);
-    let set = |arm: &mut Controller, value| arm.set_setting(Axis::Phi, Key::MaxSpeed, value);
+    let set = |arm: &mut RemoteController, value| arm.set_setting(Axis::Phi, Key::MaxSpeed, value);
     set(&mut arm, 12_000_000).unwrap();
     arm.save_settings().unwrap();
     arm.rest(2_000_000).unwrap();
@@ -342,7 +342,8 @@ fn one_arms_emergency_stop_stops_the_other_and_is_cleared_from_its_source() {
     let rig = rig_with(&[]);
     let mut light = homed(&rig);
     let mut camera =
-        Controller::connect(Box::new(rig.port(Arm::Camera)), gonia_protocol::NODE_CAMERA).unwrap();
+        RemoteController::connect(Box::new(rig.port(Arm::Camera)), gonia_protocol::NODE_CAMERA)
+            .unwrap();
     let homing = camera.home().unwrap();
     camera.poll(homing, 1_000_000).unwrap();
     light.emergency_stop().unwrap();
@@ -391,7 +392,7 @@ fn firmware_of_another_schema_is_named_and_not_moved() {
             0
         }
     }
-    let error = Controller::connect(Box::new(Elsewhere(Vec::new())), NODE_LIGHT)
+    let error = RemoteController::connect(Box::new(Elsewhere(Vec::new())), NODE_LIGHT)
         .err()
         .unwrap();
     let line = error.to_string();

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use gonia_acquire::link::{Controller, LinkError, StreamTransport, Transport};
+use gonia_acquire::link::{LinkError, RemoteController, StreamTransport, Transport};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{
@@ -133,7 +133,7 @@ struct Seen {
     log: Vec<Option<FaultCode>>,
 }
 
-fn home(arm: &mut Controller) {
+fn home(arm: &mut RemoteController) {
     let homing = arm.home().unwrap();
     let end = arm.wait(homing, 2 * MINUTE_US).unwrap();
     assert_eq!(end.outcome, RequestOutcome::Done);
@@ -150,7 +150,7 @@ fn target(i: usize) -> [i32; 2] {
 }
 
 /// Hello was said. Homing, poses, a fault, a train, an emergency stop, homing, poses.
-fn session(arm: &mut Controller) -> Seen {
+fn session(arm: &mut RemoteController) -> Seen {
     let refused = arm.move_to([0, 0]);
     let not_homed = matches!(
         refused,
@@ -211,7 +211,7 @@ fn session(arm: &mut Controller) -> Seen {
 }
 
 /// The host falls silent in mid-move: the arm stops by itself, latches, and is cleared.
-fn silence(arm: &mut Controller) {
+fn silence(arm: &mut RemoteController) {
     arm.set_setting(Axis::Theta, Key::HostWatchdog, 200_000)
         .unwrap();
     arm.move_to([0, -100_000_000]).unwrap();
@@ -227,7 +227,7 @@ fn silence(arm: &mut Controller) {
         .unwrap();
 }
 
-fn train(arm: &mut Controller) -> Vec<([i32; 2], bool)> {
+fn train(arm: &mut RemoteController) -> Vec<([i32; 2], bool)> {
     let pulses = [1000, 4000, 16_000];
     let train = TriggerRequest {
         trigger: TriggerRole::Source,
@@ -257,7 +257,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
         wire: transport,
         bytes: 0,
     };
-    let mut arm = Controller::connect(Box::new(bent), NODE_LIGHT).unwrap();
+    let mut arm = RemoteController::connect(Box::new(bent), NODE_LIGHT).unwrap();
     assert_eq!(arm.identity().board.as_str(), "qemu-mps2");
     assert_eq!(arm.identity().firmware, gonia_firmware::VERSION);
     let in_qemu = session(&mut arm);
@@ -275,7 +275,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     ];
     let rig = SimRig::with_arms(1, FaultPlan::default(), arms);
     let port = Box::new(rig.port(Arm::Light));
-    let mut arm = Controller::connect(port, NODE_LIGHT).unwrap();
+    let mut arm = RemoteController::connect(port, NODE_LIGHT).unwrap();
     let simulated = session(&mut arm);
     let after = SILENT_AFTER + 1;
     assert_eq!(in_qemu.ends[..after], simulated.ends[..after]);

@@ -6,7 +6,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use gonia_acquire::link::{Controller, Transport};
+use gonia_acquire::link::{RemoteController, Transport};
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::node::{ControllerNode, identity};
@@ -130,7 +130,8 @@ impl Transport for HostEnd {
 /// Pairs of commands: set a value never set just before, and save it.
 fn soak(seed: u64, commands: u32) {
     let line = Arc::new(Mutex::new(Line::new(seed)));
-    let mut arm = Controller::connect(Box::new(HostEnd(Arc::clone(&line))), NODE_LIGHT).unwrap();
+    let mut arm =
+        RemoteController::connect(Box::new(HostEnd(Arc::clone(&line))), NODE_LIGHT).unwrap();
     let value = |i: u32| LOWEST + (i % VALUES) as i32;
     for i in 0..commands / 2 {
         arm.set_setting(Axis::Theta, Key::Telemetry, value(i))

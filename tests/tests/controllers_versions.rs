@@ -5,7 +5,7 @@
 
 use std::io;
 
-use gonia_acquire::link::{Controller, LinkError, Transport};
+use gonia_acquire::link::{LinkError, RemoteController, Transport};
 use gonia_protocol::message::{
     Hello, Message, Move, RequestRefusal, Setting, TriggerRequest, TriggerRole,
 };
@@ -159,10 +159,10 @@ fn a_new_host_does_not_move_old_firmware_and_still_gets_its_log_and_stops_it() {
                 sent: std::sync::Arc::clone(&sent),
             })
         };
-        let refused = Controller::connect(other(), NODE_LIGHT).err();
+        let refused = RemoteController::connect(other(), NODE_LIGHT).err();
         assert!(matches!(refused, Some(LinkError::Version { .. })));
 
-        let mut arm = Controller::connect_for_service(other(), NODE_LIGHT).unwrap();
+        let mut arm = RemoteController::connect_for_service(other(), NODE_LIGHT).unwrap();
         assert_eq!(arm.identity().schema_key, schema_key);
         assert_eq!(arm.identity().board.as_str(), "sim");
         assert_eq!(arm.log().unwrap(), []);

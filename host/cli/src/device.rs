@@ -1,10 +1,10 @@
-//! `gonia device`: one controller, for a person at the bench.
+//! `gonia device`: the controller of one arm, for a person at the rig.
 
 use crate::table;
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
 use gonia_acquire::link::{
-    Controller, LinkError, StreamTransport, Ticket, calibrate_axis, is_uncalibrated,
+    LinkError, RemoteController, StreamTransport, Ticket, calibrate_axis, is_uncalibrated,
 };
 use gonia_protocol::NODE_ANY;
 use gonia_protocol::message::{ControllerState, RequestOutcome};
@@ -33,9 +33,9 @@ pub struct Device {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Who it is, and which of its encoders were never calibrated
+    /// Its board, firmware and settings, and which of its encoders were never calibrated
     Identify,
-    /// What it does, and where its axes are
+    /// Its state, and where its axes are
     Status,
     /// Print where it is until the time is over
     Monitor {
@@ -48,7 +48,7 @@ enum Action {
     /// Move both axes to angles
     #[command(allow_negative_numbers = true)]
     Move {
-        /// Elevation, degrees
+        /// Polar angle, degrees
         theta: f64,
         /// Azimuth, degrees
         phi: f64,
@@ -65,7 +65,7 @@ enum Action {
     Stop,
     /// Stop at once; the other arm stops too
     Estop,
-    /// Leave a fault or an emergency stop, when its cause is gone
+    /// Clear a latched fault or an emergency stop, when its cause is gone
     Clear,
     /// The last faults, newest first
     Log,
@@ -156,7 +156,7 @@ impl Device {
     }
 }
 
-fn connect(port: &str, baud: u32) -> Result<Controller> {
+fn connect(port: &str, baud: u32) -> Result<RemoteController> {
     let transport = match port.strip_prefix("unix:") {
         #[cfg(unix)]
         Some(path) => StreamTransport::open_unix(path.as_ref()),
@@ -164,13 +164,14 @@ fn connect(port: &str, baud: u32) -> Result<Controller> {
         Some(_) => bail!("{port}: this system has no Unix sockets"),
         None => StreamTransport::open_serial(port, baud),
     };
-    // Firmware of another protocol still says who it is, gives its log, and stops.
+    // Firmware of another protocol still answers identity, log and stops.
     let transport =
         transport.with_context(|| format!("{port}: cannot be opened; check cable and name"))?;
-    Controller::connect_for_service(Box::new(transport), NODE_ANY).with_context(|| port.to_owned())
+    RemoteController::connect_for_service(Box::new(transport), NODE_ANY)
+        .with_context(|| port.to_owned())
 }
 
-fn identify(arm: &mut Controller) -> Result<()> {
+fn identify(arm: &mut RemoteController) -> Result<()> {
     let identity = arm.identity().clone();
     let [major, minor, patch] = identity.firmware;
     let mut rows = vec![
@@ -212,7 +213,7 @@ fn identify(arm: &mut Controller) -> Result<()> {
     Ok(())
 }
 
-fn status(arm: &mut Controller) -> Result<()> {
+fn status(arm: &mut RemoteController) -> Result<()> {
     let status = arm.status()?;
     let mut rows = vec![
         ("state".to_owned(), state_in_words(status.state)),
@@ -234,7 +235,7 @@ fn status(arm: &mut Controller) -> Result<()> {
     rows.push((
         "wire".into(),
         format!(
-            "{} frames good, {} bent",
+            "{} packets good, {} damaged",
             status.packets_good, status.packets_bad
         ),
     ));
@@ -242,7 +243,7 @@ fn status(arm: &mut Controller) -> Result<()> {
     Ok(())
 }
 
-fn monitor(arm: &mut Controller, seconds: f64) -> Result<()> {
+fn monitor(arm: &mut RemoteController, seconds: f64) -> Result<()> {
     if !(0.0..=1e6).contains(&seconds) {
         bail!("--seconds {seconds}: must lie in 0..=1000000");
     }
@@ -254,7 +255,7 @@ fn monitor(arm: &mut Controller, seconds: f64) -> Result<()> {
     Ok(())
 }
 
-fn print_place(arm: &mut Controller) -> Result<()> {
+fn print_place(arm: &mut RemoteController) -> Result<()> {
     let status = arm.status()?;
     let [theta, phi] = status.axes.map(|axis| f64::from(axis.encoder_udeg) * 1e-6);
     println!(
@@ -265,7 +266,7 @@ fn print_place(arm: &mut Controller) -> Result<()> {
     Ok(())
 }
 
-fn move_to(arm: &mut Controller, target_deg: [f64; 2]) -> Result<()> {
+fn move_to(arm: &mut RemoteController, target_deg: [f64; 2]) -> Result<()> {
     let possible = -720.0..=720.0;
     if !target_deg.iter().all(|deg| possible.contains(deg)) {
         bail!("{target_deg:?}: angles must lie in -720..=720 degrees");
@@ -275,7 +276,7 @@ fn move_to(arm: &mut Controller, target_deg: [f64; 2]) -> Result<()> {
 }
 
 /// Prints where the arm is until it has arrived.
-fn follow(arm: &mut Controller, ticket: Ticket, what: &str) -> Result<()> {
+fn follow(arm: &mut RemoteController, ticket: Ticket, what: &str) -> Result<()> {
     let deadline_us = arm.now_us() + LIMIT_US;
     loop {
         let completed = match arm.poll(ticket, PRINT_US)? {
@@ -295,7 +296,7 @@ fn follow(arm: &mut Controller, ticket: Ticket, what: &str) -> Result<()> {
     }
 }
 
-fn log(arm: &mut Controller) -> Result<()> {
+fn log(arm: &mut RemoteController) -> Result<()> {
     for entry in arm.log()? {
         let axis = entry.axis.map(|axis| format!(" ({axis:?})"));
         if let Some(code) = entry.fault {
@@ -309,7 +310,7 @@ fn log(arm: &mut Controller) -> Result<()> {
     Ok(())
 }
 
-fn settings(arm: &mut Controller) -> Result<()> {
+fn settings(arm: &mut RemoteController) -> Result<()> {
     let mut rows = vec![("setting".to_owned(), "theta, phi".to_owned())];
     for meaning in &MEANINGS {
         let theta = arm.setting(Axis::Theta, meaning.key)?;
@@ -321,7 +322,7 @@ fn settings(arm: &mut Controller) -> Result<()> {
     Ok(())
 }
 
-fn set(arm: &mut Controller, axis: Axis, name: &str, value: i32) -> Result<()> {
+fn set(arm: &mut RemoteController, axis: Axis, name: &str, value: i32) -> Result<()> {
     let Some(Meaning { key, min, max, .. }) = MEANINGS.iter().find(|m| m.name == name) else {
         bail!("{name}: no such setting; `settings` prints them all");
     };
@@ -345,11 +346,11 @@ fn spread(from_deg: f64, to_deg: f64, stands: u16) -> Result<Vec<i32>> {
     Ok((0..stands).map(stand).collect())
 }
 
-fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -> Result<()> {
+fn calibrate(arm: &mut RemoteController, axis: Axis, stands: &[i32], absolute: bool) -> Result<()> {
     let is_person = std::io::stdin().is_terminal();
     let mut lines = std::io::stdin().lock().lines();
     let mut n = 0;
-    let mut ask = |arm: &mut Controller, encoder_deg: f64| {
+    let mut ask = |arm: &mut RemoteController, encoder_deg: f64| {
         n += 1;
         // Readings from a file need no prompt, and an error is then a line of its own.
         if is_person {
@@ -399,7 +400,7 @@ fn calibrate(arm: &mut Controller, axis: Axis, stands: &[i32], absolute: bool) -
         ]),
         None => rows.push((
             "gear".into(),
-            "the stands do not tell: let them lie at four or more phases of worm_turn".into(),
+            "not measured: the stands must lie at four or more phases of worm_turn".into(),
         )),
     }
     let limit = deg(f64::from(found.step_loss_limit_udeg) * 1e-6);

@@ -42,7 +42,7 @@ impl SimDevice {
 impl SimDevice {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        // There is one door, so the option only says aloud what happens anyhow.
+        // There is no other way, so the option changes nothing.
         let camera = self.frames.as_deref().zip(self.rig.as_deref());
         let rig = gonia_sim::rig::SimRig::new(self.seed, gonia_sim::fault::FaultPlan::default());
         #[cfg(feature = "genicam")]
@@ -101,7 +101,7 @@ mod ptys {
     /// How long a turn waits for bytes of the host; the simulation is behind by no more.
     const TURN: Duration = Duration::from_millis(1);
 
-    struct Door {
+    struct ArmPort {
         port: SimPort,
         master: TTYPort,
         // Kept open, so that the terminal outlives its clients.
@@ -139,7 +139,7 @@ mod ptys {
             None => None,
         };
         let mut exposed = 0;
-        let mut doors = Vec::new();
+        let mut ports = Vec::new();
         for (arm, name) in [(Arm::Light, "light arm"), (Arm::Camera, "camera arm")] {
             let (mut master, slave) =
                 TTYPort::pair().context("no pseudo-terminal to be had; close some")?;
@@ -148,7 +148,7 @@ mod ptys {
                 bail!("the pseudo-terminal has no name");
             };
             println!("{name}  {path}");
-            doors.push(Door {
+            ports.push(ArmPort {
                 port: rig.port(arm),
                 master,
                 _slave: slave,
@@ -157,12 +157,12 @@ mod ptys {
         std::io::stdout().flush()?;
         let began = Instant::now();
         loop {
-            for door in &mut doors {
-                door.hear()?;
+            for port in &mut ports {
+                port.read_master()?;
             }
             let now_us = began.elapsed().as_micros() as u64;
-            for door in &mut doors {
-                door.answer(now_us)?;
+            for port in &mut ports {
+                port.run_until(now_us)?;
             }
             if let Some(camera) = &camera
                 && rig.trigger_count() > exposed
@@ -175,8 +175,8 @@ mod ptys {
         }
     }
 
-    impl Door {
-        fn hear(&mut self) -> Result<()> {
+    impl ArmPort {
+        fn read_master(&mut self) -> Result<()> {
             let mut bytes = [0; 512];
             match self.master.read(&mut bytes) {
                 Ok(n) => self.port.send(&bytes[..n]),
@@ -186,8 +186,8 @@ mod ptys {
             Ok(())
         }
 
-        /// Lets the rig run up to now, and passes on what it said.
-        fn answer(&mut self, now_us: u64) -> Result<()> {
+        /// Lets the rig run up to now, and passes on what it sent.
+        fn run_until(&mut self, now_us: u64) -> Result<()> {
             let mut bytes = Vec::new();
             loop {
                 let left_us = now_us.saturating_sub(self.port.now_us());

@@ -31,7 +31,7 @@ impl Verify {
             (
                 "programs".into(),
                 format!(
-                    "{} took it up, {} were killed",
+                    "{} began it or went on with it, {} were killed",
                     verdict.starts, verdict.kills
                 ),
             ),

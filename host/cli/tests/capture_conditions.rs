@@ -1,11 +1,13 @@
-//! What a session gets over by itself, and what ends it in good order.
+//! What a session recovers from automatically, and what ends it cleanly.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "common/session.rs"]
 mod session;
 
 use gonia_acquire::camera::{Camera, CameraError, CommandCamera, Pulse, RenderingCamera};
-use gonia_acquire::capture::{Arms, Capture, Ended, Orders, Told, Watch, free_mb};
+use gonia_acquire::capture::{
+    Arms, Ended, Orders, SessionEvent, UnattendedSession, Watch, free_mb,
+};
 use gonia_acquire::session::{End, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
 use gonia_rig::{Frame, FrameRow, Rig, Thermometer};
@@ -96,7 +98,7 @@ impl Camera for Troubled {
 struct Nobody;
 
 impl Watch for Nobody {
-    fn tell(&self, _: &Told) {}
+    fn on_event(&self, _: &SessionEvent) {}
 }
 
 fn run(
@@ -155,7 +157,7 @@ fn run_with(
         Box::new(sim.port(Arm::Camera)),
     )
     .unwrap();
-    let capture = Capture {
+    let session_run = UnattendedSession {
         rig: &rig,
         settings: rig.session.as_ref().unwrap(),
         keep_frames: surroundings.keep_frames.then(|| folder.to_owned()),
@@ -165,7 +167,9 @@ fn run_with(
         free_mb: surroundings.free_mb,
     };
     let camera = camera(&rig, sim);
-    capture.run(&mut arms, camera, writer, &session).unwrap()
+    session_run
+        .run(&mut arms, camera, writer, &session)
+        .unwrap()
 }
 
 /// A session of the material alone under some trouble; its folder, and how it ended.
@@ -260,7 +264,7 @@ fn a_lamp_that_stays_dark_a_moved_sample_and_a_dead_camera_end_the_session_with_
             text.lines().last().unwrap().contains("stop failed"),
             "{text}"
         );
-        // Nothing doubtful was kept: what is there is what a calm session has.
+        // Nothing measured after the change was kept: what is there is what a calm session has.
         let (calm, _) = under(quiet, FaultPlan::default());
         let expected = crcs(calm.path());
         assert!(
@@ -272,7 +276,7 @@ fn a_lamp_that_stays_dark_a_moved_sample_and_a_dead_camera_end_the_session_with_
 }
 
 #[test]
-fn a_fault_and_a_cable_that_was_out_are_got_over() {
+fn a_fault_and_a_cable_that_was_out_are_recovered_automatically() {
     let (calm, clear) = under(quiet, FaultPlan::default());
     let middle_us = clear.arms.duration_us / 2;
     let at = |us, fault| FaultEvent {
@@ -333,7 +337,7 @@ fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
         &orders,
         false,
     );
-    assert_eq!(first.end, End::Paused);
+    assert_eq!(first.end, End::AwaitsMaterial);
     assert!(first.reason.contains("put the material on the target"));
     assert_eq!(verify(folder.path()).unwrap().done, POSES);
     let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
@@ -423,13 +427,13 @@ struct Airing<'a> {
 }
 
 impl Watch for Airing<'_> {
-    fn tell(&self, news: &Told) {
-        match news {
+    fn on_event(&self, event: &SessionEvent) {
+        match event {
             // Warm after the third pose.
-            Told::Pose { done, .. } if done.index == 2 => {
+            SessionEvent::Pose { done, .. } if done.index == 2 => {
                 std::fs::write(self.reading, "31.5").unwrap();
             }
-            Told::Event(text) => {
+            SessionEvent::Note(text) => {
                 self.heard.lock().unwrap().push((*text).to_owned());
                 std::fs::write(self.reading, self.degrees).unwrap();
             }

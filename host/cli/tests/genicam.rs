@@ -10,7 +10,9 @@ use common::{gonia_ok, text};
 use gonia_acquire::camera::genicam::CONTROL_PORT;
 use gonia_acquire::camera::simulated_gige::{GigeError, GigeTrouble, GigeTroubles};
 use gonia_acquire::camera::{Camera, CameraError, GenicamCamera, RenderingCamera, SimulatedGige};
-use gonia_acquire::capture::{Arms, Capture, Ended, Orders, Told, Watch, free_mb};
+use gonia_acquire::capture::{
+    Arms, Ended, Orders, SessionEvent, ShotOptions, UnattendedSession, Watch, free_mb,
+};
 use gonia_acquire::session::{End, SessionFolder, SessionWriter, verify};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction};
@@ -57,7 +59,7 @@ fn setup() -> Genicam {
         address: "127.0.0.1".into(),
         pixel_format: "BayerRG12".into(),
         trigger_source: "Line1".into(),
-        exposure: Exposure::Pulse,
+        exposure: ExposureTiming::Pulse,
         features: vec!["Width=100".into(), "Height=100".into()],
         timeout_s: 1.0,
     }
@@ -91,7 +93,7 @@ fn gige(rig: &Rig, sim: &SimRig, troubles: GigeTroubles) -> SimulatedGige {
 struct Nobody;
 
 impl Watch for Nobody {
-    fn tell(&self, _: &Told) {}
+    fn on_event(&self, _: &SessionEvent) {}
 }
 
 fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camera>) -> Ended {
@@ -103,17 +105,17 @@ fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camer
     )
     .unwrap();
     let settings = rig.session.as_ref().unwrap();
-    arms.set_options(gonia_acquire::capture::Options {
+    arms.set_options(ShotOptions {
         exposures_us: settings
             .exposures_s
             .iter()
             .map(|s| (s * 1e6) as u32)
             .collect(),
-        ..gonia_acquire::capture::Options::default()
+        ..ShotOptions::default()
     })
     .unwrap();
     let orders = Orders::default();
-    let capture = Capture {
+    let run = UnattendedSession {
         rig,
         settings,
         keep_frames: None,
@@ -122,7 +124,7 @@ fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camer
         watch: &Nobody,
         free_mb: &free_mb,
     };
-    capture.run(&mut arms, camera, writer, &session).unwrap()
+    run.run(&mut arms, camera, writer, &session).unwrap()
 }
 
 /// Reference and material through the camera; the person in between is this function.
@@ -206,7 +208,7 @@ fn a_session_through_gige_vision_has_the_samples_of_the_simulated_camera_whateve
     });
     println!("troubled: {:.1} s", began.elapsed().as_secs_f64());
     let text = journal(troubled.path());
-    // Each is got over with a retake or two.
+    // Each is recovered by a retake or two.
     let retaken = ended[0].retaken + ended[1].retaken;
     assert!((7..=14).contains(&retaken), "{retaken}: {text}");
     assert_eq!(ended[1].end, End::Finished, "{}", ended[1].reason);
@@ -299,8 +301,8 @@ fn a_camera_that_is_not_there_or_not_as_the_rig_says_is_refused_in_one_line_unti
     assert!(gone.contains("cannot be opened"), "{gone}");
     assert!(camera.ready(0).is_err());
     let _device = gige(&rig, &arms(), |_| None);
-    assert_eq!(camera.reopen(), Ok(()));
-    assert_eq!(camera.ready(0), Ok(0));
+    camera.reopen().unwrap();
+    assert_eq!(camera.ready(0).unwrap(), 0);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::filled::Filled;
 use crate::slice::Slice;
 use crate::thumbnail::Thumbnail;
-use gonia_acquire::capture::{POINTING_LIMIT_DEG, Pace, Told};
+use gonia_acquire::capture::{POINTING_LIMIT_DEG, Pace, SessionEvent};
 use gonia_acquire::session::End;
 use gonia_brdf::Pose;
 use gonia_pipeline::process::{Outcome, SampledFrame};
@@ -22,9 +22,9 @@ const THUMBNAIL_EVERY: Duration = Duration::from_millis(700);
 enum PoseState {
     /// Still to be taken.
     ToDo = 0,
-    /// Done, by its marks.
+    /// Done, registered by its fiducial lines.
     Locked = 1,
-    /// Done, at the place that the arms' reading tells.
+    /// Done, at the pose of the arms' reading.
     FellBack = 2,
     /// Done, and its frame does not show the target.
     Refused = 3,
@@ -85,7 +85,7 @@ struct Update<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     whole: Option<Whole<'a>>,
     phase: &'static str,
-    /// Whether the session was told to hold, which it does at the next pose, and to end.
+    /// Whether the session was ordered to hold, which it does at the next pose, and to end.
     held: bool,
     ends: bool,
     role: &'static str,
@@ -156,11 +156,11 @@ impl Board {
         }
     }
 
-    /// Takes in what the session tells.
-    pub fn hear(&mut self, news: &Told) {
+    /// Takes in an event of the session.
+    pub fn handle(&mut self, event: &SessionEvent) {
         self.version += 1;
-        match news {
-            Told::Begin { role, missing, .. } => {
+        match event {
+            SessionEvent::Begin { role, missing, .. } => {
                 self.role = *role;
                 self.phase = "measuring";
                 self.states.fill((PoseState::Locked, self.version));
@@ -169,10 +169,10 @@ impl Board {
                 }
                 self.pace.begin(*role, missing.len(), Instant::now());
             }
-            Told::Going { index } => self.current = Some(*index),
-            // Drawn by whoever tells, and shown by `show`.
-            Told::Frame { .. } => {}
-            Told::Pose { done, frame } => {
+            SessionEvent::Going { index } => self.current = Some(*index),
+            // Drawn by the caller, and shown by `show`.
+            SessionEvent::Frame { .. } => {}
+            SessionEvent::Pose { done, frame } => {
                 self.set(
                     done.index,
                     match frame.report.outcome {
@@ -186,23 +186,23 @@ impl Board {
                 self.worst_deg = self.worst_deg.max(done.pointing_deg);
                 self.remember(frame);
             }
-            Told::Void(poses) => {
+            SessionEvent::Discarded(poses) => {
                 for index in *poses {
                     self.set(*index, PoseState::ToDo);
                 }
-                self.pace.void(poses.len());
+                self.pace.discard(poses.len());
             }
-            Told::GivenUp { index, why } => {
+            SessionEvent::GivenUp { index, why } => {
                 self.set(*index, PoseState::GivenUp);
                 self.note(why);
             }
-            Told::Held(held) => {
+            SessionEvent::Held(held) => {
                 self.phase = if *held { "held" } else { "measuring" };
                 if !held {
                     self.pace.go_on(Instant::now());
                 }
             }
-            Told::Event(text) => self.note(text),
+            SessionEvent::Note(text) => self.note(text),
         }
     }
 
@@ -230,7 +230,7 @@ impl Board {
         self.ended = Some((end, reason.to_owned()));
     }
 
-    /// An order was given: browsers shall hear of it.
+    /// An order was given: browsers are sent it.
     pub fn touch(&mut self) {
         self.version += 1;
     }
@@ -242,11 +242,6 @@ impl Board {
             0 => *state != PoseState::ToDo,
             _ => *version > since,
         });
-        let end = |end: End| match end {
-            End::Finished => "finished",
-            End::Paused => "paused",
-            End::Failed => "failed",
-        };
         let update = Update {
             version: self.version,
             whole: (since == 0).then(|| self.whole()),
@@ -272,7 +267,7 @@ impl Board {
             },
             frame: self.last.as_ref(),
             notes: self.notes.iter().filter(|n| n.version > since).collect(),
-            ended: self.ended.as_ref().map(|(e, why)| [end(*e), why.as_str()]),
+            ended: self.ended.as_ref().map(|(e, why)| [e.name(), why.as_str()]),
         };
         // Numbers and texts alone: nothing in it that JSON cannot say.
         let text = serde_json::to_string(&update).unwrap_or_default();
@@ -391,7 +386,7 @@ mod tests {
             &plan,
             &[Role::Reference, Role::Material],
         );
-        board.hear(&Told::Begin {
+        board.handle(&SessionEvent::Begin {
             role: Role::Reference,
             missing: &[1, 2, 3, 4],
             planned: 5,
@@ -410,7 +405,7 @@ mod tests {
             crc: 0,
             pointing_deg: 0.001 * f64::from(index),
         };
-        board.hear(&Told::Pose {
+        board.handle(&SessionEvent::Pose {
             done: &done,
             frame: &frame,
         });
@@ -432,7 +427,7 @@ mod tests {
         done(&mut board, 2, Outcome::Locked);
         let lost = RegistrationFailure::LinesMissing { found: 1 };
         done(&mut board, 3, Outcome::Refused(Refusal::NotTheTarget(lost)));
-        board.hear(&Told::GivenUp {
+        board.handle(&SessionEvent::GivenUp {
             index: 4,
             why: "reference pose 4: too far",
         });
@@ -448,7 +443,7 @@ mod tests {
         );
         assert_eq!(changed["notes"][0]["text"], "reference pose 4: too far");
         // A slow one, which has seen only the beginning, is sent the same and what came after.
-        board.hear(&Told::Void(&[2]));
+        board.handle(&SessionEvent::Discarded(&[2]));
         assert_eq!(
             update(&board, second).1["poses"],
             serde_json::json!([[2, 0]])
@@ -463,12 +458,12 @@ mod tests {
     fn another_role_begins_with_an_empty_map_and_the_end_says_how() {
         let mut board = board();
         let (version, _) = update(&board, 0);
-        board.hear(&Told::Begin {
+        board.handle(&SessionEvent::Begin {
             role: Role::Material,
             missing: &[0, 1, 2, 3, 4],
             planned: 5,
         });
-        board.hear(&Told::Held(true));
+        board.handle(&SessionEvent::Held(true));
         let (_, begun) = update(&board, version);
         assert_eq!(
             (&begun["role"], &begun["phase"]),
@@ -487,7 +482,7 @@ mod tests {
     fn the_oldest_notes_go_and_a_plan_never_grows() {
         let mut board = board();
         for k in 0..1000 {
-            board.hear(&Told::Event(&format!("event {k}")));
+            board.handle(&SessionEvent::Note(&format!("event {k}")));
         }
         done(&mut board, 77, Outcome::Locked);
         let (_, whole) = update(&board, 0);

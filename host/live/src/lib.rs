@@ -1,9 +1,16 @@
 //! A running session in a browser: what it has measured so far, and two buttons.
 //!
-//! The session tells [`LivePage`] what happens, and never waits for a browser: every browser asks
-//! for what changed since it last asked, so that a slow one only sees fewer steps. Looking needs no
-//! token. Pausing, going on and ending do, and both are refused to pages of other hosts
-//! ([`Guard`](guard::Guard)).
+//! [`LivePage`] watches the session, which never waits for a browser: each browser is sent what changed
+//! since it was last sent something, so that a slow one only sees fewer steps. Looking needs no token.
+//! Pausing, going on and ending do, and both are refused to pages of other hosts (`guard`).
+//!
+//! | module | holds |
+//! |---|---|
+//! | `board` | all that the page shows, and what of it has changed |
+//! | `filled`, `slice` | bins filled so far, and a slice through them as a picture |
+//! | `thumbnail` | [`Thumbnail`]: the last frame with its fiducial lines |
+//! | `server` | [`LivePage`]: a thread that serves page, pictures, changes and orders |
+//! | `guard`, `page` | who may look and who may order; the document and its policy |
 
 mod board;
 mod filled;

@@ -1,4 +1,4 @@
-//! The server: a thread of its own, which only reads what the session has told.
+//! The server: a thread of its own, which only reads what the session's events have left on the board.
 
 use crate::board::Board;
 use crate::guard::{Guard, random_hex};
@@ -14,7 +14,7 @@ use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_core::Stream;
-use gonia_acquire::capture::{Orders, Told, Watch};
+use gonia_acquire::capture::{Orders, SessionEvent, Watch};
 use gonia_acquire::session::{End, SessionFolder};
 use gonia_formats::FileError;
 use gonia_rig::Target;
@@ -28,34 +28,34 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot, watch};
 
-/// A browser is told of changes no more often than this.
+/// A browser is sent changes no more often than this.
 const TELL_EVERY: Duration = Duration::from_millis(200);
 /// Browsers that watch at a time.
 const MOST_BROWSERS: usize = 32;
-/// How long the browsers have to take in the last word.
+/// For so long the last changes are sent to the browsers.
 const LAST_WORD: Duration = Duration::from_millis(600);
 
 /// Why there is no live page.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// Whoever is in the network could look.
+    /// Other computers of the network could look.
     #[error(
         "the live page at {0} could be seen from other computers: give a loopback address such as 127.0.0.1:8080, or add --serve-anywhere"
     )]
     NotLoopback(SocketAddr),
     /// The port is taken, or the address is not this computer's.
     #[error(
-        "the live page cannot be served at {address} ({error}); give another port with --serve, or 0 for any that is free"
+        "the live page cannot be served at {address} ({source}); give another port with --serve, or 0 for any that is free"
     )]
     Address {
         /// Which.
         address: SocketAddr,
         /// What the system says.
-        error: std::io::Error,
+        source: std::io::Error,
     },
     /// The system has no thread or no random numbers.
-    #[error("the live page cannot be started ({0})")]
-    System(String),
+    #[error("the live page cannot be started ({0}); try again, or leave --serve out")]
+    System(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// What is already measured cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
@@ -80,8 +80,12 @@ impl Listening {
         });
         bound
             .map(Self)
-            .map_err(|error| LiveError::Address { address, error })
+            .map_err(|source| LiveError::Address { address, source })
     }
+}
+
+fn no_random_bits(error: getrandom::Error) -> LiveError {
+    LiveError::System(error.into())
 }
 
 /// What the session and the server share.
@@ -130,7 +134,6 @@ impl LivePage {
         session: &SessionFolder,
         orders: &Orders,
     ) -> Result<Self, LiveError> {
-        let system = |error: &dyn std::fmt::Display| LiveError::System(error.to_string());
         let folder = session.folder();
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         let title = name.to_string_lossy().into_owned();
@@ -141,16 +144,19 @@ impl LivePage {
         let shared = Arc::new(Shared {
             board: Mutex::new(board),
             orders: orders.clone(),
-            guard: Guard::new().map_err(|e| system(&e))?,
-            nonce: random_hex().map_err(|e| system(&e))?,
+            guard: Guard::new().map_err(no_random_bits)?,
+            nonce: random_hex().map_err(no_random_bits)?,
             version: watch::Sender::new(()),
             browsers: Arc::new(Semaphore::new(MOST_BROWSERS)),
         });
-        let address = listening.0.local_addr().map_err(|e| system(&e))?;
+        let address = listening
+            .0
+            .local_addr()
+            .map_err(|error| LiveError::System(error.into()))?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
-            .map_err(|e| system(&e))?;
+            .map_err(|error| LiveError::System(error.into()))?;
         let (stop, stopped) = oneshot::channel();
         let router = router(shared.clone());
         let serve = move || {
@@ -168,7 +174,7 @@ impl LivePage {
         let thread = std::thread::Builder::new()
             .name("live page".into())
             .spawn(serve)
-            .map_err(|e| system(&e))?;
+            .map_err(|error| LiveError::System(error.into()))?;
         Ok(Self {
             shared,
             target: session.rig().target.clone(),
@@ -195,21 +201,21 @@ impl LivePage {
 }
 
 impl Watch for LivePage {
-    fn tell(&self, news: &Told) {
-        if let Told::Frame {
+    fn on_event(&self, event: &SessionEvent) {
+        if let SessionEvent::Frame {
             frame,
             registration,
             sampled,
-        } = news
+        } = event
         {
-            // Drawn while nobody waits for the board.
+            // Drawn while no other thread waits for the board.
             if self.shared.board().is_thumbnail_due() {
                 let outcome = sampled.report.outcome;
                 let thumbnail = Thumbnail::of(frame, registration, outcome, &self.target);
                 self.shared.change(|board| board.show(thumbnail, sampled));
             }
         } else {
-            self.shared.change(|board| board.hear(news));
+            self.shared.change(|board| board.handle(event));
         }
     }
 }

@@ -1,10 +1,10 @@
-//! A slice through the bins as it grows: light and view go round at one elevation each.
+//! A slice through the bins as it grows: light and view go round at one polar angle each.
 
 use gonia_brdf::{Grid, Pose};
 use gonia_render::{png, tone};
 use std::collections::VecDeque;
 
-/// Of the elevations of a plan the slice is at the one nearest to this, degrees.
+/// Of the polar angles of a plan the slice is at those nearest to this, degrees.
 const LIKED_DEG: f64 = 30.0;
 /// An empty bin shows the nearest filled one within this many bins, dimmed.
 const REACH: i32 = 8;
@@ -12,11 +12,11 @@ const DIMMED: u8 = 130;
 /// The brightest bins that may be clipped, as a share.
 const CLIPPED: f64 = 0.02;
 
-/// Mean values of the bins of one pair of elevations.
+/// Mean values of the bins of one pair of polar angles.
 #[derive(Clone)]
 pub struct Slice {
     grid: Grid,
-    /// The elevations' places in the grid.
+    /// The polar angles' places in the grid.
     rings: [usize; 2],
     sums: Vec<[f32; 3]>,
     counts: Vec<u32>,
@@ -46,7 +46,7 @@ impl Slice {
         }
     }
 
-    /// Elevations of light and view, degrees.
+    /// Polar angles of light and view, degrees.
     pub fn theta_deg(&self) -> [f64; 2] {
         self.rings.map(|ring| ring as f64 * self.grid.step_deg())
     }

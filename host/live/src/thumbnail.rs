@@ -1,4 +1,4 @@
-//! A frame as a small picture, with the marks as they were found.
+//! A frame as a small picture, with the fiducial lines as they were found.
 
 use gonia_imaging::Registration;
 use gonia_pipeline::process::Outcome;
@@ -12,7 +12,7 @@ const LONGEST_PX: usize = 480;
 const LOOKS_A_SIDE: usize = 2;
 /// The brightest pixels that may be clipped, as a share.
 const CLIPPED: f64 = 0.01;
-/// By the marks themselves; by the arms' reading; not used at all.
+/// Registered by the fiducial lines; by the arms' reading; not used at all.
 const LOCKED: [u8; 3] = [70, 230, 140];
 const FELL_BACK: [u8; 3] = [255, 180, 40];
 const REFUSED: [u8; 3] = [255, 80, 70];

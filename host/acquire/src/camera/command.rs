@@ -2,13 +2,11 @@
 
 use crate::camera::files::frame_of;
 use crate::camera::source::{Camera, CameraError, Pulse};
+use crate::program;
 use gonia_rig::{Frame, FrameRow, Rig};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-
-/// Pause between two looks at the program.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Runs a command for each frame.
 pub struct CommandCamera {
@@ -18,7 +16,8 @@ pub struct CommandCamera {
 }
 
 impl CommandCamera {
-    /// `run` is the program and its arguments, with the placeholders of `rig.toml`.
+    /// `run` is the program and its arguments, with the placeholders of `rig.toml`; it is killed when it
+    /// takes longer than `timeout_s` seconds.
     pub fn new(rig: &Rig, run: Vec<String>, timeout_s: f64) -> Self {
         Self {
             rig: rig.clone(),
@@ -48,30 +47,6 @@ impl CommandCamera {
             .stderr(Stdio::null());
         Some(command)
     }
-
-    /// Waits until the program ends; it is killed when it takes too long.
-    fn wait(&self, mut child: Child) -> Result<(), CameraError> {
-        let until = Instant::now() + self.timeout;
-        let program = self.run.first().map_or("", String::as_str);
-        let failed = |what: String| CameraError::Failed(format!("the program {program} {what}"));
-        loop {
-            match child.try_wait() {
-                Ok(Some(status)) if status.success() => return Ok(()),
-                Ok(Some(status)) => {
-                    return Err(failed(format!("ended with {status}; run it by hand")));
-                }
-                Ok(None) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
-                Ok(None) => {
-                    // It may have ended in this moment; then there is nothing to kill.
-                    let _ = child.kill();
-                    let _ = child.wait();
-                    let timeout_s = self.timeout.as_secs_f64();
-                    return Err(failed(format!("did not end within {timeout_s} s")));
-                }
-                Err(error) => return Err(failed(format!("cannot be waited for ({error})"))),
-            }
-        }
-    }
 }
 
 impl Camera for CommandCamera {
@@ -84,30 +59,23 @@ impl Camera for CommandCamera {
     }
 
     fn fetch(&mut self, shot: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
-        let failed = |what: String| CameraError::Failed(what);
-        let folder = tempfile::tempdir()
-            .map_err(|error| failed(format!("no temporary folder for the frame ({error})")))?;
+        let folder = tempfile::tempdir().map_err(CameraError::TemporaryFolder)?;
         let file = folder.path().join("frame");
         let mut command = self
             .command(shot, &file.to_string_lossy())
-            .ok_or_else(|| failed("the command is empty".into()))?;
-        let child = command.spawn().map_err(|error| {
-            let program = self.run.first().map_or("", String::as_str);
-            failed(format!(
-                "the program {program} cannot be run ({error}); check source.run in rig.toml"
-            ))
+            .ok_or(CameraError::NoProgram)?;
+        program::run(&mut command, self.timeout).map_err(|source| CameraError::Program {
+            program: self.run.first().cloned().unwrap_or_default(),
+            source,
         })?;
-        self.wait(child)?;
         let mut files: Vec<PathBuf> = std::fs::read_dir(folder.path())
-            .map_err(|error| failed(format!("the frame's folder cannot be read ({error})")))?
+            .map_err(CameraError::TemporaryFolder)?
             .filter_map(|item| Some(item.ok()?.path()))
             .collect();
         files.sort();
         let (came, expected) = (files.len(), pulses.len());
         if came != expected {
-            return Err(failed(format!(
-                "the program left {came} files where {expected} are due; check {{file}} in source.run"
-            )));
+            return Err(CameraError::FilesOfProgram { came, expected });
         }
         frame_of(&self.rig, &files, pulses)
     }
@@ -154,7 +122,7 @@ mod tests {
         write_frame(&folder.path().join("material_3.exr"), &frame).unwrap();
         let from = folder.path().join("{role}_{index}.exr");
         let from = from.to_str().unwrap();
-        assert_eq!(fetch(&["cp", from, "{file}.exr"], 10.0), Ok(frame));
+        assert_eq!(fetch(&["cp", from, "{file}.exr"], 10.0).unwrap(), frame);
         for (run, said) in [
             (&["false", "{file}"][..], "ended with"),
             (&["true", "{file}"], "left 0 files where 1 are due"),

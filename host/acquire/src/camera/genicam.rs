@@ -7,6 +7,7 @@ use aravis::{AcquisitionMode, Auto, Buffer, BufferStatus, ExposureMode, GvDevice
 use gio::prelude::*;
 use gonia_pipeline::bracket::merge_checked;
 use gonia_rig::{ExposureTiming, Frame, FrameRow, Genicam, PixelFormat, RawFrame, Rig, Sensor};
+use std::error::Error;
 use std::fmt::Display;
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::Path;
@@ -45,7 +46,7 @@ struct Open {
 
 impl Drop for Open {
     fn drop(&mut self) {
-        // One that is gone cannot be told.
+        // A camera that is gone does not answer.
         let _ = self.camera.stop_acquisition();
     }
 }
@@ -60,9 +61,7 @@ impl GenicamCamera {
         let (Some(format), Some(sensor)) =
             (PixelFormat::named(&setup.pixel_format), rig.sensor.clone())
         else {
-            return Err(CameraError::Failed(
-                "rig.toml describes no sensor or no pixel format of the camera".into(),
-            ));
+            return Err(CameraError::NoSensor);
         };
         let mut camera = Self {
             setup: setup.clone(),
@@ -81,27 +80,51 @@ impl GenicamCamera {
         Ok(camera)
     }
 
-    fn failed(&self, what: impl Display, remedy: &str) -> CameraError {
-        let address = &self.setup.address;
-        CameraError::Failed(format!("the camera at {address}: {what}; {remedy}"))
+    fn failed(&self, problem: impl Display, remedy: &'static str) -> CameraError {
+        CameraError::Device {
+            address: self.setup.address.clone(),
+            problem: problem.to_string(),
+            remedy,
+            source: None,
+        }
+    }
+
+    /// As [`Self::failed`], because of an error of the library or the system.
+    fn failed_by<E: Error + Send + Sync + 'static>(
+        &self,
+        what: &str,
+        error: E,
+        remedy: &'static str,
+    ) -> CameraError {
+        CameraError::Device {
+            address: self.setup.address.clone(),
+            problem: format!("{what} ({error})"),
+            remedy,
+            source: Some(Box::new(error)),
+        }
+    }
+
+    fn absent<E: Error + Send + Sync + 'static>(&self, error: E) -> CameraError {
+        self.failed_by(
+            "cannot be opened",
+            error,
+            "check its power, cable and address",
+        )
     }
 
     fn connect(&self) -> Result<Open, CameraError> {
-        let absent = |why: &dyn Display| {
-            self.failed(
-                format_args!("cannot be opened ({why})"),
-                "check its power, cable and address",
-            )
-        };
         let Some(ip) = self.setup.ip() else {
-            return Err(absent(&"no address"));
+            return Err(self.failed(
+                "cannot be opened (no address)",
+                "check its power, cable and address",
+            ));
         };
-        let own = own_address(ip).map_err(|error| absent(&error))?;
+        let own = own_address(ip).map_err(|error| self.absent(error))?;
         let [own, ip] = [own, ip].map(|ip| gio::InetAddress::from(std::net::IpAddr::V4(ip)));
         let until = Instant::now() + HEARTBEAT;
         let device = loop {
             // Opening by name would search the network for it.
-            let device = GvDevice::new(&own, &ip).map_err(|error| absent(&error))?;
+            let device = GvDevice::new(&own, &ip).map_err(|error| self.absent(error))?;
             if device.is_controller() {
                 break device;
             }
@@ -110,10 +133,11 @@ impl GenicamCamera {
             }
             std::thread::sleep(QUIET);
         };
-        let camera = aravis::Camera::with_device(&device).map_err(|error| absent(&error))?;
+        let camera = aravis::Camera::with_device(&device).map_err(|error| self.absent(error))?;
         self.set_up(&camera, &device).map_err(|error| {
-            self.failed(
-                format_args!("refuses a setting ({error})"),
+            self.failed_by(
+                "refuses a setting",
+                error,
                 "check [source] in rig.toml against the camera's manual",
             )
         })?;
@@ -133,7 +157,7 @@ impl GenicamCamera {
                 stream,
             })
         };
-        acquire().map_err(|error| absent(&error))
+        acquire().map_err(|error| self.absent(error))
     }
 
     fn set_up(
@@ -154,8 +178,8 @@ impl GenicamCamera {
         // Some cameras offer TriggerWidth only while a trigger is on.
         camera.set_trigger(&self.setup.trigger_source)?;
         match self.setup.exposure {
-            Exposure::Pulse => camera.set_exposure_mode(ExposureMode::TriggerWidth)?,
-            Exposure::Camera => {
+            ExposureTiming::Pulse => camera.set_exposure_mode(ExposureMode::TriggerWidth)?,
+            ExposureTiming::Camera => {
                 if camera.is_feature_available("ExposureMode")? {
                     camera.set_exposure_mode(ExposureMode::Timed)?;
                 }
@@ -168,7 +192,7 @@ impl GenicamCamera {
     }
 
     fn check_size(&self, camera: &aravis::Camera) -> Result<(), CameraError> {
-        let (_, _, width, height) = camera.region().map_err(|error| self.lost(&error))?;
+        let (_, _, width, height) = camera.region().map_err(|error| self.lost(error))?;
         let [expected_width, expected_height] = self.size_px;
         if usize::try_from(width) == Ok(expected_width)
             && usize::try_from(height) == Ok(expected_height)
@@ -184,7 +208,7 @@ impl GenicamCamera {
     }
 
     fn identity_of(&self, camera: &aravis::Camera) -> Result<String, CameraError> {
-        let lost = |error| self.lost(&error);
+        let lost = |error| self.lost(error);
         let vendor = camera.vendor_name().map_err(lost)?;
         let model = camera.model_name().map_err(lost)?;
         let serial = camera.device_serial_number();
@@ -200,9 +224,13 @@ impl GenicamCamera {
         ))
     }
 
-    fn lost(&self, error: &dyn Display) -> CameraError {
+    fn lost<E: Error + Send + Sync + 'static>(&self, error: E) -> CameraError {
+        self.failed_by("does not answer", error, "check its power and cable")
+    }
+
+    fn not_open(&self) -> CameraError {
         self.failed(
-            format_args!("does not answer ({error})"),
+            "does not answer (it is not open)",
             "check its power and cable",
         )
     }
@@ -239,7 +267,7 @@ impl Camera for GenicamCamera {
 
     fn ready(&mut self, strays: usize) -> Result<usize, CameraError> {
         let Some(open) = &self.open else {
-            return Err(self.lost(&"it is not open"));
+            return Err(self.not_open());
         };
         let until = Instant::now() + Duration::from_secs_f64(self.setup.timeout_s);
         // An acquisition that began after the pulses owes none of their frames.
@@ -264,7 +292,7 @@ impl Camera for GenicamCamera {
 
     fn fetch(&mut self, _: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
         let Some(open) = &self.open else {
-            return Err(self.lost(&"it is not open"));
+            return Err(self.not_open());
         };
         let until = Instant::now() + Duration::from_secs_f64(self.setup.timeout_s);
         let (mut stamps, mut exposures) = (Vec::new(), Vec::new());

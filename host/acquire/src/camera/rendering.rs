@@ -1,4 +1,4 @@
-//! The simulated rig's camera in a session: it renders a frame for every trigger.
+//! The simulated rig's camera in a session: it renders a frame for each shot that is fetched.
 
 use crate::camera::source::{Camera, CameraError, Pulse};
 use gonia_brdf::Vec3;
@@ -17,8 +17,9 @@ pub struct RenderingCamera {
 }
 
 impl RenderingCamera {
-    /// Looks at the demo's fabric. `planned` poses set the frames of reference and material apart.
-    /// An exact camera exposes where the arms' reading says, not where the shafts truly are.
+    /// A camera that looks at the demo's fabric. `planned`, the poses of the plan, keeps the noise of
+    /// reference and material apart. An exact camera renders the pose of the arms' reading, not that of
+    /// the true shafts.
     pub fn new(rig: &Rig, arms: SimRig, seed: u64, planned: usize, exact: bool) -> Self {
         let reference: Arc<dyn Brdf> = match rig.reference {
             Some(Reference::Reflectance(albedo)) => Arc::new(Lambertian(albedo)),
@@ -52,7 +53,7 @@ impl Camera for RenderingCamera {
             shot.pose
         } else {
             let last = self.arms.true_pose_at_last_trigger();
-            last.ok_or_else(|| CameraError::Failed("the camera saw no trigger".into()))?
+            last.ok_or(CameraError::NoTrigger)?
         };
         let first = match shot.role {
             Role::Reference => 0,

@@ -1,7 +1,10 @@
-//! What a session asks of a camera, whatever it is.
+//! What a camera is to a session.
 
+use crate::program::ProgramError;
 use gonia_formats::FileError;
 use gonia_rig::{Frame, FrameRow};
+use std::error::Error;
+use std::io;
 
 /// A trigger pulse that was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,20 +29,24 @@ impl Pulse {
 ///
 /// Frames and trigger pulses are matched by count: before each trigger the session says by
 /// [`Camera::ready`] that what came until then belongs to earlier ones. A camera that numbers its
-/// frames and tells their time matches by these too ([`super::matching`]).
+/// frames and stamps them with their time matches by these too ([`super::matching`]).
+///
+/// A camera of one's own implements this: `examples/own_camera.rs`.
 pub trait Camera: Send {
-    /// Maker, model, serial number: what a person would look for in the morning.
+    /// Maker, model, serial number, as a session's provenance keeps them. A session goes on only with
+    /// the same camera.
     fn identity(&self) -> String;
 
-    /// Makes ready for the next trigger, and forgets all frames that came before it. Of `strays`
-    /// pulses nobody wants the frames; they may still be on their way, and are waited for. Returns the
-    /// frames found that belong to no pulse at all.
+    /// Makes ready for the next trigger, and discards all frames that came before it. The frames of
+    /// `strays` pulses are not wanted; they may still be on their way, and are waited for. Returns the
+    /// number of frames that belong to no pulse at all.
     ///
     /// # Errors
     /// The camera is gone.
     fn ready(&mut self, strays: usize) -> Result<usize, CameraError>;
 
-    /// The frame of the shot that was triggered last, merged from the exposures of its pulses.
+    /// The frame of the shot that was triggered last, merged from the exposures of its pulses: linear
+    /// radiance, of the size that the rig gives.
     ///
     /// # Errors
     /// No frame, or one that cannot be used; the shot can be taken again.
@@ -64,7 +71,7 @@ pub trait Camera: Send {
 }
 
 /// Why there is no frame.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum CameraError {
     /// It did not come in time.
     #[error(
@@ -104,7 +111,55 @@ pub enum CameraError {
     /// It came, and cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Whatever else the camera says.
-    #[error("{0}")]
-    Failed(String),
+    /// The program that exposes a frame failed.
+    #[error("the program {program} {source}; run it by hand as source.run in rig.toml has it")]
+    Program {
+        /// The program.
+        program: String,
+        /// What became of it.
+        source: ProgramError,
+    },
+    /// `source.run` is empty.
+    #[error("there is no program to run; name it in source.run in rig.toml")]
+    NoProgram,
+    /// The program did not leave a file for each pulse.
+    #[error("the program left {came} files where {expected} are due; check {{file}} in source.run")]
+    FilesOfProgram {
+        /// Files that it left.
+        came: usize,
+        /// Pulses given.
+        expected: usize,
+    },
+    /// The folder in which the program leaves its files.
+    #[error("no temporary folder for the frame ({0}); check the disk")]
+    TemporaryFolder(#[source] io::Error),
+    /// A simulated camera without a trigger, or without the simulated arms that trigger it.
+    #[error("the simulated camera saw no trigger; use it with the simulated arms")]
+    NoTrigger,
+    /// GenICam was left out of this program.
+    #[error(
+        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/cameras.md)"
+    )]
+    NoGenicam,
+    /// The rig lacks what a camera of raw frames needs.
+    #[error(
+        "rig.toml describes no sensor or no pixel format of the camera; add them (docs/cameras.md)"
+    )]
+    NoSensor,
+    /// A camera on a network.
+    #[error("the camera at {address}: {problem}; {remedy}")]
+    Device {
+        /// Its address.
+        address: String,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+        /// What the library or the system says.
+        #[source]
+        source: Option<Box<dyn Error + Send + Sync>>,
+    },
+    /// A camera of one's own: its error in its own words.
+    #[error(transparent)]
+    Other(Box<dyn Error + Send + Sync>),
 }

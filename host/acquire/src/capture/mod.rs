@@ -1,29 +1,44 @@
-//! A session: both arms to every pose, a trigger, and the encoders latched with it.
+//! What a session does: both arms to every pose, a trigger, the encoders captured with it, and the frame.
+//!
+//! | module | holds |
+//! |---|---|
+//! | `equipment` | opens arms and camera, as `rig.toml` names them |
+//! | `arms` | both arms together: homing, moves, triggers, recovery |
+//! | `shot`, `shooter` | one pose with its retakes; [`run_session`] without a camera |
+//! | `unattended` | a whole session: roles, control pose, disk, temperature, orders |
+//! | `coordinator`, `frame_worker` | its threads: pulses and frames matched, frames sampled and kept |
+//! | `control`, `thermometer`, `disk` | the conditions under which poses count |
+//! | `keep_out`, `timing`, `pace` | ways that keep the arms apart; how long moves and sessions take |
+//! | `watch`, `orders`, `port` | events for those who watch; orders; ports that are opened again |
 
-mod accounts;
 mod arms;
-mod conditions;
 mod control;
-mod desk;
+mod coordinator;
+mod disk;
+mod equipment;
+mod frame_worker;
 pub mod keep_out;
 mod orders;
 mod pace;
 mod port;
-mod session;
+mod shooter;
+mod shot;
 mod thermometer;
 mod timing;
 mod travel;
 mod unattended;
 mod watch;
 
-pub use arms::{Arms, BadExposures, HomeError, Options};
-pub use conditions::free_mb;
+pub use arms::{Arms, BadExposures, HomeError, ShotOptions};
 pub use control::{Comparison, Judgement};
+pub use disk::free_mb;
+pub use equipment::{ArmPortNames, Equipment, EquipmentError, simulated_arms};
 pub use orders::Orders;
 pub use pace::Pace;
-pub use port::{Opener, SessionPort};
-pub use session::{SessionError, SessionSummary, Shooter, Shot, ShotOutcome, run_session};
+pub use port::{PortOpener, SessionPort};
+pub use shooter::{SessionError, SessionSummary, Shooter, run_session};
+pub use shot::{Shot, ShotOutcome};
 pub use timing::{POINTING_LIMIT_DEG, SETTLE_TIME_S, move_time_s, nearest_turn_deg};
 pub use travel::{KeptApart, keep_apart, travelling, travelling_order};
-pub use unattended::{Capture, Ended};
-pub use watch::{Told, Watch, Watchers};
+pub use unattended::{Ended, UnattendedSession};
+pub use watch::{SessionEvent, Watch, Watchers};

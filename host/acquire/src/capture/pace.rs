@@ -1,4 +1,4 @@
-//! How fast a session goes, and how long it will take yet.
+//! The rate of a session, and the time that is left.
 
 use gonia_rig::Role;
 use std::collections::VecDeque;
@@ -58,8 +58,8 @@ impl Pace {
         }
     }
 
-    /// So many poses are done no more.
-    pub fn void(&mut self, poses: usize) {
+    /// So many poses were discarded.
+    pub fn discard(&mut self, poses: usize) {
         self.done = self.done.saturating_sub(poses);
     }
 
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(pace.left_s(), Some(8.0 * 1900.0));
         // Half as fast from here on, after a night's pause.
         pace.go_on(at(50_000));
-        pace.void(2);
+        pace.discard(2);
         pace.pose(at(50_016));
         assert_eq!((pace.done, pace.rate()), (99, Some(0.0625)));
         pace.begin(Role::Material, 400, at(60_000));

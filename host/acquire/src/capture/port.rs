@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 const SLICE_US: u64 = 50_000;
 
 /// Opens a port.
-pub type Opener = Box<dyn FnMut() -> io::Result<Box<dyn Transport>> + Send>;
+pub type PortOpener = Box<dyn FnMut() -> io::Result<Box<dyn Transport>> + Send>;
 
 /// A port that comes back.
 pub struct SessionPort {
-    open: Opener,
+    open: PortOpener,
     inner: Option<Box<dyn Transport>>,
     orders: Orders,
     /// The order to stop has been passed on; what follows is the stopping itself.
@@ -28,7 +28,7 @@ impl SessionPort {
     ///
     /// # Errors
     /// What the system says.
-    pub fn open(mut open: Opener, orders: &Orders) -> io::Result<Self> {
+    pub fn open(mut open: PortOpener, orders: &Orders) -> io::Result<Self> {
         let inner = Some(open()?);
         Ok(Self {
             open,
@@ -121,7 +121,7 @@ mod tests {
         let calls = Arc::new(Mutex::new(0));
         let opened = Arc::new(Mutex::new(0));
         let (c, o) = (calls.clone(), opened.clone());
-        let open: Opener = Box::new(move || {
+        let open: PortOpener = Box::new(move || {
             *o.lock().unwrap() += 1;
             Ok(Box::new(Breaking(c.clone())) as Box<dyn Transport>)
         });

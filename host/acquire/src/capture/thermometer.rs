@@ -1,56 +1,76 @@
-//! How warm it is, by a program that knows.
+//! The temperature, read by a program.
 
+use crate::program::{self, ProgramError};
 use gonia_rig::Thermometer;
 use std::io::Read;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A program that takes longer than this does not answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
-/// Pause between two looks at it.
-const LOOK_EVERY: Duration = Duration::from_millis(2);
 
-/// Whether it is as warm as it may be; what is wrong, in words, where it is not, or where nobody can
-/// say.
-pub fn check(thermometer: &Thermometer) -> Result<(), String> {
+/// Why a session waits for a temperature.
+#[derive(Debug, thiserror::Error)]
+pub enum TemperatureError {
+    /// Too cold or too warm, degrees Celsius.
+    #[error("the temperature is {degrees} degrees C, and {least} to {most} are allowed")]
+    OutOfLimits {
+        /// The reading.
+        degrees: f64,
+        /// The lower limit.
+        least: f64,
+        /// The upper limit.
+        most: f64,
+    },
+    /// The program gave no reading.
+    #[error("the thermometer {name} {source}; run it by hand")]
+    Program {
+        /// The program.
+        name: String,
+        /// What became of it.
+        source: ProgramError,
+    },
+    /// The program's first word is no number.
+    #[error("the thermometer {name} says \"{word}\", which is no number; run it by hand")]
+    NoNumber {
+        /// The program.
+        name: String,
+        /// Its first word.
+        word: String,
+    },
+}
+
+/// Whether the temperature is within its limits.
+///
+/// # Errors
+/// It is not, or is not known.
+pub fn check(thermometer: &Thermometer) -> Result<(), TemperatureError> {
     let [least, most] = thermometer.limits_c;
     let degrees = read(&thermometer.run)?;
     if (least..=most).contains(&degrees) {
         return Ok(());
     }
-    Err(format!(
-        "the temperature is {degrees} degrees C, and {least} to {most} are allowed"
-    ))
+    Err(TemperatureError::OutOfLimits {
+        degrees,
+        least,
+        most,
+    })
 }
 
-/// What a program says.
-fn read(run: &[String]) -> Result<f64, String> {
-    let name = run.first().map_or("", String::as_str);
-    let failed = |what: String| format!("the thermometer {name} {what}; run it by hand");
-    let mut child = Command::new(name)
+/// The number that a program prints, degrees Celsius.
+fn read(run: &[String]) -> Result<f64, TemperatureError> {
+    let name = || run.first().cloned().unwrap_or_default();
+    let mut command = Command::new(name());
+    command
         .args(run.get(1..).unwrap_or_default())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .map_err(|error| failed(format!("cannot be run ({error})")))?;
-    let until = Instant::now() + TIMEOUT;
-    let status = loop {
-        match child.try_wait() {
-            Ok(Some(status)) => break status,
-            Ok(None) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
-            Ok(None) => {
-                // It may have ended in this moment; then there is nothing to kill.
-                let _ = child.kill();
-                let _ = child.wait();
-                return Err(failed(format!("did not end within {TIMEOUT:?}")));
-            }
-            Err(error) => return Err(failed(format!("cannot be waited for ({error})"))),
-        }
-    };
-    if !status.success() {
-        return Err(failed(format!("ended with {status}")));
-    }
+        .stderr(Stdio::null());
+    let mut child =
+        program::run(&mut command, TIMEOUT).map_err(|source| TemperatureError::Program {
+            name: name(),
+            source,
+        })?;
     let mut said = [0; 64];
     let n = child
         .stdout
@@ -60,7 +80,10 @@ fn read(run: &[String]) -> Result<f64, String> {
     let word = said.split_whitespace().next().unwrap_or_default();
     match word.parse::<f64>() {
         Ok(degrees) if degrees.is_finite() => Ok(degrees),
-        _ => Err(failed(format!("says \"{word}\", which is no number"))),
+        _ => Err(TemperatureError::NoNumber {
+            name: name(),
+            word: word.to_owned(),
+        }),
     }
 }
 
@@ -87,7 +110,9 @@ mod tests {
             };
             match (check(&thermometer), said) {
                 (Ok(()), None) => {}
-                (Err(why), Some(said)) => assert!(why.contains(said), "{why}"),
+                (Err(why), Some(said)) => {
+                    assert!(why.to_string().contains(said), "{why}");
+                }
                 other => panic!("{run:?}: {other:?}"),
             }
         }

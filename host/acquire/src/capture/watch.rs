@@ -1,19 +1,19 @@
-//! What a running session tells those who watch it.
+//! The events of a running session, for those who watch it.
 
 use crate::session::PoseDone;
 use gonia_imaging::Registration;
 use gonia_pipeline::process::SampledFrame;
 use gonia_rig::{Frame, Role};
 
-/// Somebody who watches; called from several threads, which wait for it: it must be quick.
+/// Watches a session. It is called from several threads, which wait for it: it must be quick.
 pub trait Watch: Sync {
-    /// Hears what happened.
-    fn tell(&self, news: &Told);
+    /// Is called at each event.
+    fn on_event(&self, event: &SessionEvent);
 }
 
 /// What happened.
 #[derive(Clone, Debug)]
-pub enum Told<'a> {
+pub enum SessionEvent<'a> {
     /// A role begins, or goes on.
     Begin {
         /// What lies on the target.
@@ -28,11 +28,11 @@ pub enum Told<'a> {
         /// Its place in the plan.
         index: usize,
     },
-    /// A frame was looked at, also one that is not kept.
+    /// A frame was sampled, also one that is not kept.
     Frame {
         /// Its pixels.
         frame: &'a Frame,
-        /// Where its marks are.
+        /// Where its fiducial lines are.
         registration: &'a Registration,
         /// What it showed.
         sampled: &'a SampledFrame,
@@ -44,8 +44,8 @@ pub enum Told<'a> {
         /// What it showed.
         frame: &'a SampledFrame,
     },
-    /// Poses are done no more, and are taken again.
-    Void(&'a [usize]),
+    /// Poses were discarded, since the control pose has changed, and are taken again.
+    Discarded(&'a [usize]),
     /// A pose was given up.
     GivenUp {
         /// Its place in the plan.
@@ -56,16 +56,16 @@ pub enum Told<'a> {
     /// The session is held by hand, or goes on.
     Held(bool),
     /// Something that a person should know.
-    Event(&'a str),
+    Note(&'a str),
 }
 
-/// Several who watch.
+/// Several watchers.
 pub struct Watchers<'a>(pub Vec<&'a dyn Watch>);
 
 impl Watch for Watchers<'_> {
-    fn tell(&self, news: &Told) {
+    fn on_event(&self, event: &SessionEvent) {
         for watch in &self.0 {
-            watch.tell(news);
+            watch.on_event(event);
         }
     }
 }

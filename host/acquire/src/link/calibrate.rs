@@ -5,7 +5,7 @@ use gonia_protocol::settings::{Axis, Key};
 
 use crate::link::error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
 use crate::link::gear_map::{GearMapFit, GearReading, fit_gear_map};
-use crate::link::{Controller, LinkError, Ticket};
+use crate::link::{LinkError, RemoteController, Ticket};
 
 /// Readings of the encoder that are averaged at a stand, and the time between two, µs.
 const READINGS: i32 = 16;
@@ -64,11 +64,11 @@ pub enum CalibrateError {
 /// # Errors
 /// A fault under way, a reference that is not read, or readings that make no map.
 pub fn calibrate_axis(
-    arm: &mut Controller,
+    arm: &mut RemoteController,
     axis: Axis,
     stands_udeg: &[i32],
     is_absolute: bool,
-    reference: &mut dyn FnMut(&mut Controller, f64) -> Result<f64, String>,
+    reference: &mut dyn FnMut(&mut RemoteController, f64) -> Result<f64, String>,
 ) -> Result<Calibration, CalibrateError> {
     // Of both axes: the other one may not be calibrated yet, and homing homes both.
     let mut guards = Vec::new();
@@ -147,7 +147,7 @@ pub fn calibrate_axis(
 ///
 /// # Errors
 /// The link failed.
-pub fn is_uncalibrated(arm: &mut Controller, axis: Axis) -> Result<bool, LinkError> {
+pub fn is_uncalibrated(arm: &mut RemoteController, axis: Axis) -> Result<bool, LinkError> {
     for key in Key::ERROR_MAP {
         if arm.setting(axis, key)? != 0 {
             return Ok(false);
@@ -156,13 +156,13 @@ pub fn is_uncalibrated(arm: &mut Controller, axis: Axis) -> Result<bool, LinkErr
     Ok(true)
 }
 
-fn home(arm: &mut Controller) -> Result<(), CalibrateError> {
+fn home(arm: &mut RemoteController) -> Result<(), CalibrateError> {
     let ticket = arm.home()?;
     end_well(arm, ticket, "homing")
 }
 
 fn end_well(
-    arm: &mut Controller,
+    arm: &mut RemoteController,
     ticket: Ticket,
     what: &'static str,
 ) -> Result<(), CalibrateError> {
@@ -176,7 +176,7 @@ fn end_well(
     }
 }
 
-fn mean_encoder_deg(arm: &mut Controller, axis: Axis) -> Result<f64, LinkError> {
+fn mean_encoder_deg(arm: &mut RemoteController, axis: Axis) -> Result<f64, LinkError> {
     let mut sum_deg = 0.0;
     for _ in 0..READINGS {
         arm.rest(PAUSE_US)?;

@@ -1,4 +1,4 @@
-//! One arm's controller, as the host knows it.
+//! The controller of one arm, as the host knows it.
 
 use std::collections::VecDeque;
 
@@ -13,23 +13,23 @@ use gonia_protocol::{NODE_ANY, NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA
 
 use crate::link::{LinkError, Transport};
 
-/// The host watchdog is restarted this often while something is waited for, µs: an eighth of its
-/// default, since on a bad wire one packet in ten may be lost.
+/// The host watchdog is restarted this often while something is waited for, µs: an eighth of its default,
+/// since on a bad wire one packet in ten may be lost.
 pub const HEARTBEAT_US: u64 = 250_000;
-/// After so long without news of something accepted, the host asks: the event may be lost.
+/// After so long without a packet the host requests the status: an event may be lost.
 const ASK_AFTER_US: u64 = 2_000_000;
-/// Latches kept until somebody takes them.
+/// Captured pulses that are kept until they are read.
 const MAX_LATCHES: usize = 64;
 
-/// Something accepted, whose end will be told.
+/// A request that was accepted; an event will say when it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ticket {
     request: u16,
     what: &'static str,
 }
 
-/// A controller behind a transport.
-pub struct Controller {
+/// The controller of one arm, behind a transport.
+pub struct RemoteController {
     arm: String,
     transport: Box<dyn Transport>,
     session: u32,
@@ -47,17 +47,23 @@ pub struct Controller {
     heartbeat_us: u64,
 }
 
-impl Controller {
-    /// Says hello and checks that both speak the same protocol. `node` is the controller's address,
-    /// or [`NODE_ANY`] for whoever is at the other end.
+impl RemoteController {
+    /// Says hello and checks that both speak the same protocol. `node` is the controller's address, or
+    /// [`NODE_ANY`] for whichever is at the other end.
+    ///
+    /// # Errors
+    /// No answer, or another protocol.
     pub fn connect(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
         let controller = Self::connect_for_service(transport, node)?;
         controller.check_version()?;
         Ok(controller)
     }
 
-    /// Says hello, also to firmware of another protocol. What is not always answered is then refused
-    /// here: who it is, its status, its log and stops are left.
+    /// Says hello, also to firmware of another protocol. Requests that such firmware may not answer are
+    /// then refused here: identity, status, log and stops are left.
+    ///
+    /// # Errors
+    /// No answer.
     pub fn connect_for_service(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
         let now_us = transport.now_us();
         let mut controller = Self {
@@ -84,6 +90,9 @@ impl Controller {
 
     /// Says hello again, after the controller restarted or the cable was out. Returns whether it
     /// has restarted since the last time.
+    ///
+    /// # Errors
+    /// No answer, or another protocol.
     pub fn reconnect(&mut self) -> Result<bool, LinkError> {
         let before = self.identity.boot_id;
         self.hello()?;
@@ -91,7 +100,7 @@ impl Controller {
         Ok(self.identity.boot_id != before)
     }
 
-    /// Who it is.
+    /// Its board, firmware, settings' checksum and last start.
     pub fn identity(&self) -> &Identity {
         &self.identity
     }
@@ -101,7 +110,7 @@ impl Controller {
         self.link.node()
     }
 
-    /// What people call it.
+    /// Its name: light arm, camera arm, or controller where its address is not known.
     pub fn name(&self) -> &str {
         &self.arm
     }
@@ -116,12 +125,12 @@ impl Controller {
         (self.events_lost, self.link.repeats())
     }
 
-    /// The newest telemetry.
+    /// The newest telemetry; `None` before the first.
     pub fn telemetry(&self) -> Option<&Telemetry> {
         self.telemetry.as_ref()
     }
 
-    /// How it is.
+    /// Its state and where its axes are.
     pub fn status(&mut self) -> Result<Status, LinkError> {
         match self.ask(&Message::GetStatus, "status")?.1 {
             Message::Status(status) => Ok(status),
@@ -139,21 +148,22 @@ impl Controller {
         self.begin(&Message::Move(Move { target_udeg }), "a move")
     }
 
-    /// Makes ready for a trigger train. The ticket ends only on a follower: when it has latched the
-    /// last pulse. Latches of earlier trains are forgotten.
+    /// Requests a trigger train, which [`Self::fire`] starts. The ticket ends only on a follower: when it
+    /// has captured the last pulse. What was captured in earlier trains is discarded.
     pub fn request_trigger(&mut self, request: TriggerRequest) -> Result<Ticket, LinkError> {
         self.latches.clear();
         self.begin(&Message::RequestTrigger(request), "the trigger request")
     }
 
-    /// Starts the armed train; the ticket ends with its last pulse.
+    /// Starts the train that was requested; the ticket ends with its last pulse.
     pub fn fire(&mut self) -> Result<Ticket, LinkError> {
         self.begin(&Message::Fire, "the trigger")
     }
 
-    /// Leaves the armed state.
+    /// Withdraws the trigger request.
     pub fn disarm(&mut self) -> Result<(), LinkError> {
-        self.begin(&Message::Disarm, "disarming").map(drop)
+        self.begin(&Message::Disarm, "withdrawing the trigger request")
+            .map(drop)
     }
 
     /// Decelerates and stops.
@@ -161,7 +171,7 @@ impl Controller {
         self.begin(&Message::Stop, "a stop").map(drop)
     }
 
-    /// Stops at once, and latches; the other controller stops too.
+    /// Stops at once, and stays stopped until the fault is cleared; the other controller stops too.
     pub fn emergency_stop(&mut self) -> Result<(), LinkError> {
         self.begin(&Message::EStop, "an emergency stop").map(drop)
     }
@@ -172,14 +182,15 @@ impl Controller {
             .map(drop)
     }
 
-    /// The latch of a pulse of the last train: from its event, or asked for where that was lost.
+    /// What was captured at a pulse of the last train, counted from 0: from its event, or requested where
+    /// that was lost.
     pub fn latch(&mut self, pulse: u8) -> Result<Latch, LinkError> {
         if let Some(latch) = self.latches.iter().find(|latch| latch.pulse == pulse) {
             return Ok(latch.clone());
         }
-        match self.ask(&Message::ReadLatch(pulse), "a latch")?.1 {
+        match self.ask(&Message::ReadLatch(pulse), "a captured pulse")?.1 {
             Message::LatchIs(latch) => Ok(latch),
-            _ => Err(self.confused("a latch")),
+            _ => Err(self.confused("a captured pulse")),
         }
     }
 
@@ -224,7 +235,7 @@ impl Controller {
         Ok(entries)
     }
 
-    /// Waits a while for something accepted to end; `None` if it has not. Restarts the host watchdog.
+    /// Waits at most `timeout_us` for a request to end; `None` if it has not. Restarts the host watchdog.
     pub fn poll(
         &mut self,
         ticket: Ticket,
@@ -253,7 +264,7 @@ impl Controller {
         }
     }
 
-    /// Waits until something accepted has ended.
+    /// Waits until a request has ended, at most `limit_us`.
     pub fn wait(&mut self, ticket: Ticket, limit_us: u64) -> Result<Completed, LinkError> {
         match self.poll(ticket, limit_us)? {
             Some(completed) => Ok(completed),
@@ -261,7 +272,7 @@ impl Controller {
         }
     }
 
-    /// After waiting for so long in vain: asks, for the event may be lost.
+    /// After waiting for so long without an end: requests the status, for the event may be lost.
     pub fn must_have_ended(
         &mut self,
         ticket: Ticket,
@@ -275,7 +286,7 @@ impl Controller {
         })
     }
 
-    /// Lets time pass, and takes in what arrives.
+    /// Lets time pass, and reads what arrives.
     pub fn rest(&mut self, for_us: u64) -> Result<(), LinkError> {
         let until_us = self.now_us() + for_us;
         while self.now_us() < until_us {
@@ -285,7 +296,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Restarts the host watchdog, if it is time to.
+    /// Restarts the host watchdog, if it is due.
     pub fn keep_alive(&mut self) -> Result<(), LinkError> {
         let now_us = self.now_us();
         if now_us >= self.heartbeat_us + HEARTBEAT_US {
@@ -317,7 +328,7 @@ impl Controller {
     /// Whether both speak the same protocol.
     ///
     /// # Errors
-    /// [`LinkError::Version`]: only who it is, its status, its log and stops can be asked for.
+    /// [`LinkError::Version`]: only identity, status, log and stops are left.
     pub fn check_version(&self) -> Result<(), LinkError> {
         let identity = &self.identity;
         let speaks = identity.protocol_min..=identity.protocol_max;
@@ -345,7 +356,7 @@ impl Controller {
         }
     }
 
-    /// Sends a request and waits for its answer, repeating it as often as the retry policy allows.
+    /// Sends a request and waits for its answer, repeating it as often as its timeouts allow.
     fn ask(&mut self, message: &Message, what: &'static str) -> Result<(u16, Message), LinkError> {
         if !Message::is_always_answered(message.kind()) {
             self.check_version()?;
@@ -414,7 +425,7 @@ impl Controller {
             })
     }
 
-    /// Takes in what arrives; returns the answer to request `id` if it is among it.
+    /// Reads what arrives; returns the answer to request `id` if it is among it.
     fn listen(&mut self, timeout_us: u64, id: Option<u16>) -> Result<Option<Message>, LinkError> {
         let mut bytes = std::mem::take(&mut self.incoming);
         bytes.clear();
@@ -500,7 +511,7 @@ fn name_of(node: u8) -> &'static str {
     }
 }
 
-/// Stands in until the first hello is answered; nobody sees it.
+/// Until the first hello is answered.
 fn no_identity() -> Identity {
     Identity {
         protocol_min: 0,

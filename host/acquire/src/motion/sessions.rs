@@ -2,7 +2,7 @@
 //! that differs from the default.
 
 use crate::capture::{Arms, ShotOutcome, run_session};
-use crate::link::{Controller, LinkError};
+use crate::link::{LinkError, RemoteController};
 use gonia_brdf::Pose;
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::fault::{Arm, FaultPlan};
@@ -179,7 +179,7 @@ fn measure(
     Ok(())
 }
 
-fn set(controller: &mut Controller, key: Key, setting: i32) -> Result<(), LinkError> {
+fn set(controller: &mut RemoteController, key: Key, setting: i32) -> Result<(), LinkError> {
     for axis in Axis::BOTH {
         if key == Key::MaxSpeed {
             // Homing is no faster than the arm may be.

@@ -3,10 +3,15 @@
 use gonia_rig::Role;
 use std::fmt;
 
+/// The reason with which a session ends between reference and material, for people and in the journal,
+/// where it tells [`End::AwaitsMaterial`] from another pause.
+pub const CHANGE_THE_SAMPLE: &str =
+    "the reference is measured: put the material on the target and go on with --resume";
+
 /// One line's content.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Entry {
-    /// A program took the session up, for the first time or again.
+    /// A program began the session, or went on with it.
     Start(String),
     /// A pose is done: its frame is on the disk.
     Pose(PoseDone),
@@ -14,12 +19,17 @@ pub enum Entry {
     GivenUp(String),
     /// A control pose was compared with its first take.
     Control(String),
-    /// Poses are done no more, from this line of the journal on (counted from 0), for the control
-    /// pose came out otherwise.
-    Void(usize, String),
+    /// The poses of later lines are discarded, since the control pose has changed. In the journal:
+    /// `void`.
+    Discard {
+        /// From this line of the journal on, counted from 0.
+        since: usize,
+        /// How the control pose has changed.
+        why: String,
+    },
     /// Anything else that somebody should know in the morning.
     Event(String),
-    /// The program left the session in good order.
+    /// The program ended cleanly: in which state, and why.
     Stop(End, String),
 }
 
@@ -45,18 +55,34 @@ pub struct PoseDone {
 pub enum End {
     /// Every pose is done, or given up.
     Finished,
-    /// Somebody asked for a pause, or must change the sample.
+    /// A person ordered it.
     Paused,
-    /// Something is wrong.
+    /// The reference is measured, and a person must put the material on the target.
+    AwaitsMaterial,
+    /// Something is wrong that does not go away.
     Failed,
 }
 
 impl End {
-    const ALL: [(End, &'static str); 3] = [
-        (End::Finished, "finished"),
-        (End::Paused, "paused"),
-        (End::Failed, "failed"),
-    ];
+    /// Its word in the journal and on the live page. [`End::AwaitsMaterial`] is a pause there.
+    pub fn name(self) -> &'static str {
+        match self {
+            End::Finished => "finished",
+            End::Paused | End::AwaitsMaterial => "paused",
+            End::Failed => "failed",
+        }
+    }
+
+    /// Of a line of the journal.
+    fn of_line(word: &str, reason: &str) -> Option<Self> {
+        Some(match word {
+            "finished" => End::Finished,
+            "paused" if reason == CHANGE_THE_SAMPLE => End::AwaitsMaterial,
+            "paused" => End::Paused,
+            "failed" => End::Failed,
+            _ => return None,
+        })
+    }
 }
 
 impl fmt::Display for Entry {
@@ -75,12 +101,9 @@ impl fmt::Display for Entry {
             ),
             Entry::GivenUp(text) => write!(f, "given-up {}", one_line(text)),
             Entry::Control(text) => write!(f, "control {}", one_line(text)),
-            Entry::Void(since, text) => write!(f, "void since={since} {}", one_line(text)),
+            Entry::Discard { since, why } => write!(f, "void since={since} {}", one_line(why)),
             Entry::Event(text) => write!(f, "event {}", one_line(text)),
-            Entry::Stop(end, text) => {
-                let word = End::ALL.iter().find(|(e, _)| e == end).map_or("", |e| e.1);
-                write!(f, "stop {word} {}", one_line(text))
-            }
+            Entry::Stop(end, text) => write!(f, "stop {} {}", end.name(), one_line(text)),
         }
     }
 }
@@ -96,13 +119,15 @@ impl Entry {
             "control" => Entry::Control(rest.into()),
             "void" => {
                 let (since, why) = rest.split_once(' ')?;
-                Entry::Void(since.strip_prefix("since=")?.parse().ok()?, why.into())
+                Entry::Discard {
+                    since: since.strip_prefix("since=")?.parse().ok()?,
+                    why: why.into(),
+                }
             }
             "event" => Entry::Event(rest.into()),
             "stop" => {
                 let (word, reason) = rest.split_once(' ')?;
-                let end = End::ALL.iter().find(|(_, name)| *name == word)?.0;
-                Entry::Stop(end, reason.into())
+                Entry::Stop(End::of_line(word, reason)?, reason.into())
             }
             _ => return None,
         })
@@ -150,10 +175,15 @@ mod tests {
             Entry::Pose(pose),
             Entry::GivenUp("material 3: no trigger".into()),
             Entry::Control("material 0 ratio=1.001".into()),
-            Entry::Void(17, "the lamp is darker".into()),
+            Entry::Discard {
+                since: 17,
+                why: "the lamp is darker".into(),
+            },
             Entry::Event("the disk is nearly full".into()),
             Entry::Stop(End::Finished, "all poses done".into()),
             Entry::Stop(End::Failed, "the camera is gone".into()),
+            Entry::Stop(End::Paused, "by Ctrl-C".into()),
+            Entry::Stop(End::AwaitsMaterial, CHANGE_THE_SAMPLE.into()),
         ] {
             assert_eq!(Entry::parse(&entry.to_string()), Some(entry));
         }

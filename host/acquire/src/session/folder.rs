@@ -208,7 +208,7 @@ impl SessionFolder {
 
     /// How many bytes of frames the journal vouches for.
     pub(super) fn frame_bytes(&self) -> u64 {
-        // Also those of poses that are void: nothing may be written over.
+        // Also those of discarded poses: nothing may be written over.
         let ends = self.lines.entries.iter().map(|entry| match entry {
             Entry::Pose(pose) => pose.at + pose.bytes,
             _ => 0,
@@ -243,7 +243,7 @@ fn poses_done(
     for (i, entry) in lines.entries.iter().enumerate() {
         let pose = match entry {
             Entry::Pose(pose) => pose,
-            Entry::Void(since, _) => {
+            Entry::Discard { since, .. } => {
                 done.retain(|_, (line, _)| *line < *since);
                 continue;
             }

@@ -1,10 +1,10 @@
-//! A session as a folder that a person can read, and that no death of the program harms.
+//! A session as a folder that a person can read, crash-safe.
 //!
 //! | file | holds | written |
 //! |---|---|---|
 //! | `rig.toml`, `plan.csv` | the rig and the poses, as the session began with them | whole |
 //! | `provenance.toml` | versions, controllers and their settings' checksums, camera, seed | whole |
-//! | `journal.log` | start, pose, event, stop: a line each, checksummed | appended, synced a line |
+//! | `journal.log` | start, pose, event, stop: a line each ([`Entry`]), checksummed | appended, synced a line |
 //! | `frames.bin` | what each frame showed at the grid points ([`record`]) | appended, synced a frame |
 //! | `lock` | held while a capture runs | – |
 //!
@@ -21,13 +21,13 @@ mod samples;
 mod verify;
 mod writer;
 
-pub use entry::{End, Entry, PoseDone};
+pub use entry::{CHANGE_THE_SAMPLE, End, Entry, PoseDone};
 pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 pub use provenance::{ControllerIdentity, Provenance};
 pub use verify::{Finding, Verdict, verify};
 pub use writer::{Beginning, Claim, SessionWriter};
 
-/// The checksum of the wire, CRC-32C, also of everything here.
+/// CRC-32C, the checksum of the wire and of everything here.
 fn crc32c(bytes: &[u8]) -> u32 {
     const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
     CRC.checksum(bytes)

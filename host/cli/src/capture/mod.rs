@@ -1,14 +1,14 @@
-//! `gonia capture`: a session on a bench, or on the simulated one.
+//! `gonia capture`: a session on a rig, or on the simulated one.
 
-mod bench;
 mod map;
 mod terminal;
 
 use crate::progress::Progress;
 use crate::{account, table};
 use anyhow::{Context, Result, bail};
-use bench::{Bench, Ports};
-use gonia_acquire::capture::{Capture as Run, Ended, Orders, Watch, Watchers, free_mb, travelling};
+use gonia_acquire::capture::{
+    ArmPortNames, Ended, Equipment, Orders, UnattendedSession, Watch, Watchers, free_mb, travelling,
+};
 use gonia_acquire::session::{
     Beginning, Claim, ControllerIdentity, End, Entry, Provenance, RIG, SessionFolder, SessionWriter,
 };
@@ -63,7 +63,7 @@ pub struct Capture {
     serve_anywhere: bool,
 }
 
-/// The session's folder before the controllers are asked.
+/// The session's folder, before the controllers are connected.
 enum Folder {
     Fresh(Claim),
     Begun(SessionWriter),
@@ -83,50 +83,24 @@ impl Capture {
             Some(address) => Some(Listening::at(address, self.serve_anywhere)?),
             None => None,
         };
-        let begun = self.resume && SessionFolder::is_session(&self.folder);
-        let (folder, plan) = if begun {
-            let (writer, session) = SessionWriter::resume(&self.folder)?;
-            check_same(&self.folder.join(RIG), &rig_text, &self.rig)?;
-            let plan = session.plan().to_vec();
-            if let Some(path) = &self.plan
-                && read_plan_csv(path)? != plan
-            {
-                bail!(
-                    "{}: is not the plan that the session began with; leave --plan out, or begin a session in another folder",
-                    path.display()
-                );
-            }
-            (Folder::Begun(writer), plan)
-        } else {
-            let claim = Claim::new(&self.folder, beside.map(|b| b.0))?;
-            (Folder::Fresh(claim), self.fresh_plan()?)
-        };
+        let (folder, plan) = self.folder_and_plan(&rig_text, beside.map(|b| b.0))?;
         let orders = Orders::default();
         let on_interrupt = orders.clone();
         ctrlc::set_handler(move || on_interrupt.interrupt())
             .context("Ctrl-C cannot be caught on this system")?;
 
-        let ports = Ports {
+        let ports = ArmPortNames {
             light: self.light.as_deref(),
             camera: self.camera_arm.as_deref(),
             simulated: self.simulated,
         };
-        let mut bench = Bench::open(&rig, &self.rig, ports, plan.len(), &settings, &orders)?;
-        if let Some(warning) = bench.arms.calibration_warning()? {
+        let mut equipment =
+            Equipment::open(&rig, &self.rig, ports, plan.len(), &settings, &orders)?;
+        if let Some(warning) = equipment.arms.calibration_warning()? {
             eprintln!("warning: {warning}");
         }
-        bench.check_reach(&plan)?;
-        let provenance = Provenance {
-            program: gonia_pipeline::provenance::program(),
-            began: String::new(),
-            rig_crc: String::new(),
-            plan_crc: String::new(),
-            reference: settings.reference,
-            camera: bench.camera.identity(),
-            seed: bench.seed,
-            light_arm: ControllerIdentity::from(bench.arms.light().identity()),
-            camera_arm: ControllerIdentity::from(bench.arms.camera().identity()),
-        };
+        equipment.check_reach(&plan)?;
+        let provenance = provenance_of(&mut equipment, settings.reference);
         let mut writer = match folder {
             Folder::Begun(writer) => writer,
             Folder::Fresh(claim) => claim.begin(Beginning {
@@ -137,7 +111,7 @@ impl Capture {
             })?,
         };
         let session = SessionFolder::open(&self.folder)?;
-        check_bench(session.provenance(), &provenance)?;
+        check_equipment(session.provenance(), &provenance)?;
         writer.note(&Entry::Start(format!(
             "{}, light arm {}, camera arm {}",
             provenance.program, provenance.light_arm.config_crc, provenance.camera_arm.config_crc
@@ -157,21 +131,45 @@ impl Capture {
             Some(live) => vec![&terminal, live],
             None => vec![&terminal],
         };
-        let run = Run {
+        let run = UnattendedSession {
             rig: session.rig(),
             settings: &settings,
             keep_frames: self.keep_frames.then(|| self.folder.clone()),
-            exact: bench.exact,
+            exact: equipment.exact,
             orders: &orders,
             watch: &Watchers(watchers),
             free_mb: &free_mb,
         };
-        let ended = run.run(&mut bench.arms, bench.camera, writer, &session)?;
+        let ended = run.run(&mut equipment.arms, equipment.camera, writer, &session)?;
         terminal.finish();
         if let Some(live) = &live {
             live.end(ended.end, &ended.reason);
         }
         self.conclude(&ended)
+    }
+
+    /// The session's folder, locked, and its poses: of the session in it, or of a new one.
+    fn folder_and_plan(
+        &self,
+        rig_text: &[u8],
+        beside: Option<&str>,
+    ) -> Result<(Folder, Vec<Pose>)> {
+        if !(self.resume && SessionFolder::is_session(&self.folder)) {
+            let claim = Claim::new(&self.folder, beside)?;
+            return Ok((Folder::Fresh(claim), self.fresh_plan()?));
+        }
+        let (writer, session) = SessionWriter::resume(&self.folder)?;
+        check_same(&self.folder.join(RIG), rig_text, &self.rig)?;
+        let plan = session.plan().to_vec();
+        if let Some(path) = &self.plan
+            && read_plan_csv(path)? != plan
+        {
+            bail!(
+                "{}: is not the plan that the session began with; leave --plan out, or begin a session in another folder",
+                path.display()
+            );
+        }
+        Ok((Folder::Begun(writer), plan))
     }
 
     fn fresh_plan(&self) -> Result<Vec<Pose>> {
@@ -214,6 +212,21 @@ impl Capture {
     }
 }
 
+/// What the session is measured with. Checksums of its files and its time are put in when it begins.
+fn provenance_of(equipment: &mut Equipment, reference: bool) -> Provenance {
+    Provenance {
+        program: gonia_pipeline::provenance::program(),
+        began: String::new(),
+        rig_crc: String::new(),
+        plan_crc: String::new(),
+        reference,
+        camera: equipment.camera.identity(),
+        seed: equipment.seed,
+        light_arm: ControllerIdentity::from(equipment.arms.light().identity()),
+        camera_arm: ControllerIdentity::from(equipment.arms.camera().identity()),
+    }
+}
+
 /// Where the live page is. What is behind the # no browser sends on.
 fn say_where(live: &LivePage) {
     let (address, token) = (live.address(), live.token());
@@ -221,7 +234,7 @@ fn say_where(live: &LivePage) {
     eprintln!("without the token the page only shows: http://{address}/");
 }
 
-/// The file that a rig speaks of, beside it.
+/// The file that a rig names, beside it.
 fn beside(path: &Path, rig: &Rig) -> Result<Option<(String, Vec<u8>)>, FileError> {
     let Some(Reference::Table { file, .. }) = &rig.reference else {
         return Ok(None);
@@ -244,7 +257,7 @@ fn check_same(kept: &Path, text: &[u8], given: &Path) -> Result<()> {
 }
 
 /// A session goes on with what it began with.
-fn check_bench(began: &Provenance, now: &Provenance) -> Result<()> {
+fn check_equipment(began: &Provenance, now: &Provenance) -> Result<()> {
     for (name, began, now) in [
         ("light arm", &began.light_arm, &now.light_arm),
         ("camera arm", &began.camera_arm, &now.camera_arm),
@@ -298,7 +311,7 @@ fn describe(session: &SessionFolder, ended: &Ended) -> Vec<(String, String)> {
         (
             "this run".into(),
             format!(
-                "{} ({} on the arms' clock), {} shots, {} taken again by the arms and {} for their frames, {} faults got over",
+                "{} ({} on the arms' clock), {} shots, {} taken again by the arms and {} for their frames, {} faults recovered automatically",
                 table::duration(took_s),
                 table::duration(ended.arms.duration_us as f64 * 1e-6),
                 ended.arms.kept,

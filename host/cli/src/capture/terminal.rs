@@ -2,7 +2,7 @@
 
 use crate::capture::map::{Mark, PoseMap};
 use crate::table;
-use gonia_acquire::capture::{Pace, Told, Watch};
+use gonia_acquire::capture::{Pace, SessionEvent, Watch};
 use gonia_acquire::session::SessionFolder;
 use gonia_formats::write_whole_bytes;
 use gonia_live::Thumbnail;
@@ -18,20 +18,20 @@ use std::time::{Duration, Instant};
 const LINE_EVERY: Duration = Duration::from_secs(10);
 /// A terminal with fewer rows has no map.
 const ROWS_FOR_MAP: u16 = 20;
-/// The last frame with its marks as they were found.
+/// The last frame with its fiducial lines as they were found.
 const LAST_FRAME: &str = "last_frame.png";
 
-/// Prints what a session tells.
+/// Prints the events of a session.
 pub struct Terminal {
     bar: ProgressBar,
     plain: bool,
     has_map: bool,
     last_frame: PathBuf,
     target: Target,
-    state: Mutex<State>,
+    state: Mutex<Shown>,
 }
 
-struct State {
+struct Shown {
     role: Role,
     pace: Pace,
     map: PoseMap,
@@ -61,14 +61,16 @@ impl Terminal {
             }
             bar
         };
-        let rows = rustix::termios::tcgetwinsize(std::io::stderr()).map_or(0, |size| size.ws_row);
+        let rows = console::Term::stderr()
+            .size_checked()
+            .map_or(0, |(rows, _)| rows);
         Self {
             bar,
             plain,
             has_map: rows >= ROWS_FOR_MAP,
             last_frame: session.folder().join(LAST_FRAME),
             target: session.rig().target.clone(),
-            state: Mutex::new(State {
+            state: Mutex::new(Shown {
                 role: Role::Material,
                 pace: Pace::new(plan.len(), roles.len()),
                 map: PoseMap::new(plan),
@@ -95,7 +97,7 @@ impl Terminal {
         }
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, Shown> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -120,12 +122,12 @@ impl Terminal {
         }
     }
 
-    fn event(&self, state: &mut State, text: &str) {
+    fn event(&self, state: &mut Shown, text: &str) {
         state.events += 1;
         self.line(text);
     }
 
-    fn draw(&self, state: &State) {
+    fn draw(&self, state: &Shown) {
         let mut lines = Vec::new();
         if self.has_map {
             lines = state.map.lines(state.current);
@@ -139,7 +141,7 @@ impl Terminal {
 }
 
 /// Rate, time left, pointing error and faults.
-fn figures(state: &State) -> String {
+fn figures(state: &Shown) -> String {
     let rate = state.pace.rate().unwrap_or(0.0);
     let left = state.pace.left_s().map_or("?".into(), table::duration);
     let events = match state.events {
@@ -154,12 +156,12 @@ fn figures(state: &State) -> String {
 }
 
 impl Watch for Terminal {
-    fn tell(&self, news: &Told) {
-        if let Told::Frame {
+    fn on_event(&self, event: &SessionEvent) {
+        if let SessionEvent::Frame {
             frame,
             registration,
             sampled,
-        } = news
+        } = event
             && self.is_picture_due()
         {
             // Not while others wait for the state: the arms are among them.
@@ -167,8 +169,8 @@ impl Watch for Terminal {
             self.keep_picture(&Thumbnail::of(frame, registration, outcome, &self.target));
         }
         let mut state = self.state();
-        match news {
-            Told::Begin {
+        match event {
+            SessionEvent::Begin {
                 role,
                 missing,
                 planned,
@@ -183,9 +185,9 @@ impl Watch for Terminal {
                     state.pace.done
                 ));
             }
-            Told::Going { index } => state.current = Some(*index),
-            Told::Frame { .. } => return,
-            Told::Pose { done, frame } => {
+            SessionEvent::Going { index } => state.current = Some(*index),
+            SessionEvent::Frame { .. } => return,
+            SessionEvent::Pose { done, frame } => {
                 let mark = match frame.report.outcome {
                     Outcome::Refused(_) => Mark::Bad,
                     _ => Mark::Done,
@@ -204,19 +206,19 @@ impl Watch for Terminal {
                     );
                 }
             }
-            Told::Void(poses) => {
+            SessionEvent::Discarded(poses) => {
                 for index in *poses {
                     state.map.set(*index, Mark::ToDo);
                 }
-                state.pace.void(poses.len());
+                state.pace.discard(poses.len());
             }
-            Told::GivenUp { index, why } => {
+            SessionEvent::GivenUp { index, why } => {
                 state.map.set(*index, Mark::Bad);
                 self.event(&mut state, why);
             }
-            Told::Held(true) => {}
-            Told::Held(false) => state.pace.go_on(Instant::now()),
-            Told::Event(text) => self.event(&mut state, text),
+            SessionEvent::Held(true) => {}
+            SessionEvent::Held(false) => state.pace.go_on(Instant::now()),
+            SessionEvent::Note(text) => self.event(&mut state, text),
         }
         self.bar.set_position(state.pace.done as u64);
         self.draw(&state);

@@ -7,7 +7,7 @@ mod summary;
 use crate::account;
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
-use gonia_acquire::camera::SimulatedCamera;
+use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::travelling;
 use gonia_brdf::model::{Kurt, Material};
 use gonia_brdf::{DenseBrdf, Pose};
@@ -113,7 +113,7 @@ impl Run {
         write_rig(&self.path("rig.toml"), &self.rig)?;
         write_plan_csv(&self.path("plan.csv"), &self.poses)?;
         let keep_frames = self.demo.keep_frames || self.demo.quick;
-        let mut camera = SimulatedCamera::new(Scene::new(
+        let mut camera = SimulatedFrames::new(Scene::new(
             SceneGeometry::of_rig(&self.rig),
             self.material.brdf.clone(),
             Arc::new(Kurt::white_reference_fabric()),

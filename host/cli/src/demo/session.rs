@@ -2,7 +2,7 @@
 //! over the material.
 
 use anyhow::Result;
-use gonia_acquire::camera::SimulatedCamera;
+use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
 use gonia_brdf::Pose;
 use gonia_formats::{Pointing, Refused};
@@ -49,7 +49,7 @@ impl Session {
 pub fn measure(
     poses: &[Pose],
     seed: u64,
-    camera: &mut SimulatedCamera,
+    camera: &mut SimulatedFrames,
     progress: &dyn Fn(f64),
 ) -> Result<Session> {
     let rig = SimRig::new(seed, FaultPlan::default());

@@ -1,5 +1,5 @@
-//! The camera of the simulated rig: it exposes when it is triggered, at the true angles of the
-//! arms' shafts, and renders the frame when it is read out.
+//! Frames of the simulated rig, rendered one by one when they are processed: what a capture folder would
+//! hold.
 
 use gonia_brdf::Pose;
 use gonia_formats::frame_exr::write_frame;
@@ -9,8 +9,8 @@ use gonia_rig::{Frame, FrameRow, Role};
 use gonia_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 
-/// What was exposed so far.
-pub struct SimulatedCamera {
+/// The frames that were exposed so far: their readings, and the true angles of the arms' shafts.
+pub struct SimulatedFrames {
     scene: Scene,
     rows: Vec<FrameRow>,
     /// True poses, by the number of the frame.
@@ -18,8 +18,8 @@ pub struct SimulatedCamera {
     keep: Option<PathBuf>,
 }
 
-impl SimulatedCamera {
-    /// A camera that looks at a scene.
+impl SimulatedFrames {
+    /// No frames yet, of a scene.
     pub fn new(scene: Scene) -> Self {
         Self {
             scene,
@@ -29,7 +29,7 @@ impl SimulatedCamera {
         }
     }
 
-    /// Also writes each frame that is read out into `folder/frames`, as a capture folder has them.
+    /// Also writes each frame that is loaded into `folder/frames`, as a capture folder has them.
     ///
     /// # Errors
     /// When the folder cannot be made or written to.
@@ -53,7 +53,7 @@ impl SimulatedCamera {
     }
 }
 
-impl FrameSource for SimulatedCamera {
+impl FrameSource for SimulatedFrames {
     fn rows(&self) -> &[FrameRow] {
         &self.rows
     }

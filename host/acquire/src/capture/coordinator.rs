@@ -1,10 +1,10 @@
-//! Which pulses, frames and poses belong together: kept by the arms' thread.
+//! Which pulses, frames and poses belong together: kept by the arms' thread, which sends work to the
+//! camera's thread and the worker's, and handles their events.
 
-use crate::camera::{Camera, CameraError};
-use crate::capture::control::Comparison;
-use crate::capture::desk::{News, Taken, Task, Work, lock};
+use crate::camera::Camera;
+use crate::capture::frame_worker::{ControlTake, Fetched, Taken, Task, Work, WorkerEvent, lock};
 use crate::capture::orders::Orders;
-use crate::capture::watch::{Told, Watch};
+use crate::capture::watch::{SessionEvent, Watch};
 use crate::session::{Entry, SessionWriter};
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -12,29 +12,39 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender};
 use std::time::{Duration, Instant};
 
-/// How often an order to stop is looked for while the camera works.
+/// While the camera works, an order to stop is looked for this often.
 const LISTEN_EVERY: Duration = Duration::from_millis(50);
 
 /// Why a session ends before its last pose.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Halt {
-    /// Somebody wants it to.
+    /// A person ordered it; with the order.
     Paused(String),
-    /// The arms were stopped by hand: they stay where they are.
+    /// The reference is measured, and a person must put the material on the target.
+    AwaitsMaterial,
+    /// The arms were stopped by hand, and stay where they are; with the order.
     Stopped(String),
-    /// Something does not go away.
+    /// What is wrong does not go away; with what it is.
     Failed(String),
 }
 
-/// What is under way between arms, camera and desk.
-pub struct Accounts<'a> {
+/// Channels between the arms' thread and the others.
+pub struct Channels {
+    /// To the camera's thread.
+    pub shots: Sender<Taken>,
+    /// To the worker.
+    pub work: SyncSender<Work>,
+    /// From both.
+    pub events: Receiver<WorkerEvent>,
+}
+
+/// What is under way between arms, camera and worker.
+pub struct Coordinator<'a> {
     pub camera: &'a Mutex<Box<dyn Camera>>,
     pub writer: &'a Mutex<SessionWriter>,
     pub watch: &'a dyn Watch,
     pub orders: &'a Orders,
-    pub shots: Sender<Taken>,
-    pub work: SyncSender<Work>,
-    pub news: Receiver<News>,
+    channels: Channels,
     /// The session's folder.
     pub folder: PathBuf,
     /// Poses to be taken.
@@ -43,34 +53,34 @@ pub struct Accounts<'a> {
     pub since_control: Vec<usize>,
     /// The control pose, once there is one.
     pub control: Option<usize>,
-    /// What came of the last control pose.
-    pub compared: Option<Option<Comparison>>,
+    /// The last take of the control pose, until it is looked at.
+    pub control_take: Option<ControlTake>,
     /// Pulses a shot has.
     pub pulses: usize,
     /// Pulses whose frames nobody will fetch.
     strays: usize,
     /// The shot whose frame is being fetched, or is not confirmed.
     in_flight: Option<Task>,
-    /// What the camera said of that shot, if it has.
-    fetched: Option<Result<(), CameraError>>,
+    /// How its fetch ended, once it has.
+    fetched: Option<Fetched>,
     exposes_in_fetch: bool,
-    /// Frames confirmed of which the desk has not told what became.
-    on_desk: usize,
+    /// Frames confirmed that the worker is not done with.
+    in_work: usize,
     max_retries: u32,
     pause: Duration,
-    /// Shots taken again for the camera's or the disk's sake.
+    /// Shots taken again because of the camera or the disk.
     pub retaken: u32,
-    /// Time by the host's clock in which the session waited for something to pass.
+    /// Time by the host's clock in which the session paused.
     pub paused: Duration,
 }
 
-impl<'a> Accounts<'a> {
+impl<'a> Coordinator<'a> {
     pub fn new(
         camera: &'a Mutex<Box<dyn Camera>>,
         writer: &'a Mutex<SessionWriter>,
         watch: &'a dyn Watch,
         orders: &'a Orders,
-        (shots, work, news): (Sender<Taken>, SyncSender<Work>, Receiver<News>),
+        channels: Channels,
         pulses: usize,
         (max_retries, pause): (u32, Duration),
     ) -> Self {
@@ -79,20 +89,18 @@ impl<'a> Accounts<'a> {
             writer,
             watch,
             orders,
-            shots,
-            work,
-            news,
+            channels,
             folder: lock(writer).folder().to_owned(),
             queue: VecDeque::new(),
             since_control: Vec::new(),
             control: None,
-            compared: None,
+            control_take: None,
             pulses,
             strays: 0,
             in_flight: None,
             fetched: None,
             exposes_in_fetch: lock(camera).exposes_in_fetch(),
-            on_desk: 0,
+            in_work: 0,
             max_retries,
             pause,
             retaken: 0,
@@ -100,17 +108,17 @@ impl<'a> Accounts<'a> {
         }
     }
 
-    /// Tells everybody, and the journal.
-    pub fn event(&mut self, text: &str) {
-        self.watch.tell(&Told::Event(text));
+    /// Notes something that a person should know, for those who watch and in the journal.
+    pub fn note(&mut self, text: &str) {
+        self.watch.on_event(&SessionEvent::Note(text));
         // A disk that does not take this line is found out by the next frame.
         let _ = lock(self.writer).note(&Entry::Event(text.to_owned()));
     }
 
-    /// Both arms are at rest, and the trigger comes next: the last shot's account is closed, and the
-    /// camera is ready for this one.
+    /// Both arms are at rest, and the trigger comes next: the last shot is closed, and the camera is ready
+    /// for this one.
     pub fn before_trigger(&mut self) -> Result<(), Halt> {
-        self.settle()?;
+        self.close_last_shot()?;
         self.strays = self.pulses;
         Ok(())
     }
@@ -119,44 +127,44 @@ impl<'a> Accounts<'a> {
     pub fn triggered(&mut self, taken: Taken) -> Result<(), Halt> {
         self.strays = 0;
         self.in_flight = Some(taken.task.clone());
-        self.shots.send(taken).map_err(|_| ended_early())?;
+        self.channels.shots.send(taken).map_err(|_| ended_early())?;
         if self.exposes_in_fetch {
-            self.settle()?;
+            self.close_last_shot()?;
         }
         Ok(())
     }
 
-    /// Closes the account of the last shot: its frame came, and no other; or it is taken again.
-    pub fn settle(&mut self) -> Result<(), Halt> {
+    /// Closes the last shot: its frame came, and no other; or it is taken again.
+    pub fn close_last_shot(&mut self) -> Result<(), Halt> {
         let mut last = self.in_flight.take();
         if let Some(task) = &last
-            && let Err(error) = self.camera_free()?
+            && let Fetched::Nothing(error) = self.wait_for_camera()?
         {
             self.strays += self.pulses;
-            self.event(&format!("pose {}: {error}; taken again", task.index));
+            self.note(&format!("pose {}: {error}; taken again", task.index));
             self.again(task.clone(), &error.to_string())?;
             self.reopen()?;
             last = None;
         }
         let strays = std::mem::take(&mut self.strays);
         let ready = lock(self.camera).ready(strays);
-        let doubt = match ready {
+        let trouble = match ready {
             Ok(0) => None,
             Ok(n) => Some(format!("{n} frames came that belong to no trigger")),
             Err(ref error) => Some(error.to_string()),
         };
-        match (last, &doubt) {
+        match (last, &trouble) {
             (Some(_), None) => {
-                self.on_desk += 1;
+                self.in_work += 1;
                 self.send(Work::Confirm)?;
             }
-            (Some(task), Some(doubt)) => {
-                self.event(&format!("pose {}: {doubt}; taken again", task.index));
-                self.send(Work::Void)?;
-                self.again(task, doubt)?;
+            (Some(task), Some(trouble)) => {
+                self.note(&format!("pose {}: {trouble}; taken again", task.index));
+                self.send(Work::Discard)?;
+                self.again(task, trouble)?;
             }
             (None, None) => {}
-            (None, Some(doubt)) => self.event(doubt),
+            (None, Some(trouble)) => self.note(trouble),
         }
         if ready.is_err() {
             self.reopen()?;
@@ -164,19 +172,19 @@ impl<'a> Accounts<'a> {
         Ok(())
     }
 
-    /// Takes in what the desk has told, without waiting.
-    pub fn listen(&mut self) -> Result<(), Halt> {
-        while let Ok(news) = self.news.try_recv() {
-            self.hear(news)?;
+    /// Handles the events that are there, without waiting.
+    pub fn handle_events(&mut self) -> Result<(), Halt> {
+        while let Ok(event) = self.channels.events.try_recv() {
+            self.handle(event)?;
         }
         Ok(())
     }
 
-    /// Waits until the desk has told what became of every frame.
-    pub fn clear_desk(&mut self) -> Result<(), Halt> {
-        while self.on_desk > 0 {
-            let news = self.news.recv().map_err(|_| ended_early())?;
-            self.hear(news)?;
+    /// Waits until the worker is done with every frame.
+    pub fn wait_for_worker(&mut self) -> Result<(), Halt> {
+        while self.in_work > 0 {
+            let event = self.channels.events.recv().map_err(|_| ended_early())?;
+            self.handle(event)?;
         }
         Ok(())
     }
@@ -198,13 +206,13 @@ impl<'a> Accounts<'a> {
         Ok(())
     }
 
-    fn camera_free(&mut self) -> Result<Result<(), CameraError>, Halt> {
+    fn wait_for_camera(&mut self) -> Result<Fetched, Halt> {
         loop {
-            if let Some(result) = self.fetched.take() {
-                return Ok(result);
+            if let Some(fetched) = self.fetched.take() {
+                return Ok(fetched);
             }
-            match self.news.recv_timeout(LISTEN_EVERY) {
-                Ok(news) => self.hear(news)?,
+            match self.channels.events.recv_timeout(LISTEN_EVERY) {
+                Ok(event) => self.handle(event)?,
                 Err(RecvTimeoutError::Disconnected) => return Err(ended_early()),
                 Err(RecvTimeoutError::Timeout) if self.orders.stops() => {
                     return Err(Halt::Stopped("by a second Ctrl-C".into()));
@@ -214,31 +222,31 @@ impl<'a> Accounts<'a> {
         }
     }
 
-    fn hear(&mut self, news: News) -> Result<(), Halt> {
-        if !matches!(news, News::Camera(_)) {
-            self.on_desk = self.on_desk.saturating_sub(1);
+    fn handle(&mut self, event: WorkerEvent) -> Result<(), Halt> {
+        if !matches!(event, WorkerEvent::Fetched(_)) {
+            self.in_work = self.in_work.saturating_sub(1);
         }
-        match news {
-            News::Camera(result) => {
-                self.fetched = Some(result);
+        match event {
+            WorkerEvent::Fetched(fetched) => {
+                self.fetched = Some(fetched);
                 Ok(())
             }
-            News::Kept(done, is_baseline) => {
+            WorkerEvent::Kept { done, is_baseline } => {
                 self.since_control.push(done.index);
                 if is_baseline {
                     self.control = Some(done.index);
                 }
                 Ok(())
             }
-            News::Again(task, why) => self.again(task, &why),
-            News::NotKept(task, error) => {
-                self.event(&format!("pose {}: {error}", task.index));
+            WorkerEvent::Repeat(task, why) => self.again(task, &why),
+            WorkerEvent::NotKept(task, error) => {
+                self.note(&format!("pose {}: {error}", task.index));
                 self.again(task, &error.to_string())?;
                 self.wait();
                 Ok(())
             }
-            News::Compared(comparison) => {
-                self.compared = Some(comparison);
+            WorkerEvent::Control(take) => {
+                self.control_take = Some(take);
                 Ok(())
             }
         }
@@ -254,7 +262,7 @@ impl<'a> Accounts<'a> {
                     return Err(Halt::Failed(format!("the camera stays away: {error}")));
                 }
                 Err(error) => {
-                    self.event(&format!("the camera cannot be opened: {error}"));
+                    self.note(&format!("the camera cannot be opened: {error}"));
                     self.wait();
                 }
             }
@@ -276,7 +284,7 @@ impl<'a> Accounts<'a> {
     }
 
     fn send(&self, work: Work) -> Result<(), Halt> {
-        self.work.send(work).map_err(|_| ended_early())
+        self.channels.work.send(work).map_err(|_| ended_early())
     }
 }
 

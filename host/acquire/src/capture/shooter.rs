@@ -1,42 +1,13 @@
 //! Every pose of a list, one after the other.
 
-use gonia_brdf::Pose;
-use gonia_brdf::direction::{Direction, angle_between};
-use gonia_protocol::message::{ControllerState, RequestRefusal};
-use std::time::{Duration, Instant};
-
-use crate::capture::arms::{Arms, HomeError, Latched, Try};
+use crate::capture::arms::{Arms, HomeError, Latched, TryError};
+use crate::capture::shot::{ShotOutcome, shot_of};
 use crate::capture::timing::POINTING_LIMIT_DEG;
 use crate::link::LinkError;
-
-/// A shot that is kept.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shot {
-    /// Its pose's place in the list.
-    pub index: usize,
-    /// Where the arms were by encoder at the last pulse.
-    pub encoder: Pose,
-    /// The largest |commanded − encoder| of all axes and pulses, degrees.
-    pub pointing_error_deg: f64,
-    /// How often it had to be taken again.
-    pub retakes: u32,
-    /// When each pulse rose, by the clock of the controller that gave it, µs.
-    pub pulse_times_us: Vec<u64>,
-}
-
-/// What came of a pose.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ShotOutcome {
-    /// Within the pointing limit, by encoder.
-    Kept(Shot),
-    /// Given up.
-    Refused {
-        /// Its pose's place in the list.
-        index: usize,
-        /// Why, in words for people.
-        reason: String,
-    },
-}
+use gonia_brdf::Pose;
+use gonia_brdf::direction::angle_between;
+use gonia_protocol::message::{ControllerState, RequestRefusal};
+use std::time::{Duration, Instant};
 
 /// A session in figures.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +18,7 @@ pub struct SessionSummary {
     pub refused: usize,
     /// Shots taken again.
     pub retakes: u32,
-    /// Faults, restarts and lost cables that were got over.
+    /// Faults, restarts and lost cables after which the arms were recovered automatically.
     pub recoveries: u32,
     /// The largest pointing error of the kept shots, degrees.
     pub max_pointing_error_deg: f64,
@@ -78,13 +49,14 @@ pub enum SessionError {
         /// Which limit.
         reason: String,
     },
-    /// Whoever takes the shots has failed, or wants no more.
+    /// The caller, to whom each shot is given, failed or wants no more.
     #[error("pose {index}: {reason}")]
     Taker {
         /// The pose that was taken.
         index: usize,
-        /// In its own words.
-        reason: String,
+        /// The caller's own error.
+        #[source]
+        reason: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
@@ -102,13 +74,14 @@ pub fn run_session(
     let mut shooter = Shooter::new(arms);
     let result = shooter.home().and_then(|()| {
         for (index, pose) in poses.iter().enumerate() {
-            on_shot(shooter.take(index, pose, &mut || Ok(()))?)?;
+            let outcome = shooter.take::<SessionError>(index, pose, &mut || Ok(()))?;
+            on_shot(outcome)?;
         }
         Ok(())
     });
     let summary = shooter.finish();
     if result.is_err() {
-        // The error that is reported is the first one; this is only for safety's sake.
+        // Only for safety: the error that is reported is the first one.
         let _ = arms.stop();
     }
     result.map(|()| summary)
@@ -151,7 +124,7 @@ impl<'a> Shooter<'a> {
         self.summary
     }
 
-    /// Homes the arms that need it, and gets over a fault on the way.
+    /// Homes the arms that need it. A fault on the way is recovered automatically.
     ///
     /// # Errors
     /// Arms that cannot be brought back.
@@ -165,8 +138,8 @@ impl<'a> Shooter<'a> {
         homed.map_err(|source| SessionError::Arms { index: 0, source })
     }
 
-    /// Takes up arms that may still be under way for a host that died, or have stopped because it
-    /// did: they are stopped, cleared, and homed if they lost their place.
+    /// Takes over arms that may still move for a program that was killed, or have stopped because it
+    /// was: they are stopped, their faults cleared, and they are homed if they lost their place.
     ///
     /// # Errors
     /// Arms that cannot be brought back.
@@ -192,9 +165,10 @@ impl<'a> Shooter<'a> {
     /// The link failed, or a controller refuses.
     pub fn park(&mut self, pose: &Pose) -> Result<(), LinkError> {
         let began = Instant::now();
-        let parked = match self.arms.targets_udeg(pose) {
-            Some(targets) => self.arms.go(targets).map(drop),
-            None => Ok(()),
+        let parked = match self.arms.targets_udeg(pose).map(|to| self.arms.go(to)) {
+            Some(Err(TryError::Link(error))) => Err(error),
+            // Where the arms do not get there, they stay on the way.
+            _ => Ok(()),
         };
         self.busy += began.elapsed();
         parked
@@ -204,13 +178,14 @@ impl<'a> Shooter<'a> {
     /// settled.
     ///
     /// # Errors
-    /// A pose out of reach, arms that cannot be brought back, or an error of `at_rest`.
-    pub fn take(
+    /// A pose out of reach, arms that cannot be brought back, or whatever error `at_rest` gives: it is
+    /// passed on as it is.
+    pub fn take<E: From<SessionError>>(
         &mut self,
         index: usize,
         pose: &Pose,
-        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
-    ) -> Result<ShotOutcome, SessionError> {
+        at_rest: &mut dyn FnMut() -> Result<(), E>,
+    ) -> Result<ShotOutcome, E> {
         let outcome = self.take_one(index, pose, at_rest)?;
         match &outcome {
             ShotOutcome::Kept(shot) => {
@@ -225,12 +200,12 @@ impl<'a> Shooter<'a> {
         Ok(outcome)
     }
 
-    fn take_one(
+    fn take_one<E: From<SessionError>>(
         &mut self,
         index: usize,
         pose: &Pose,
-        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
-    ) -> Result<ShotOutcome, SessionError> {
+        at_rest: &mut dyn FnMut() -> Result<(), E>,
+    ) -> Result<ShotOutcome, E> {
         self.check_apart(index, pose)?;
         let mut reason = String::new();
         for retakes in 0..=self.arms.options.max_retakes {
@@ -242,33 +217,23 @@ impl<'a> Shooter<'a> {
                     index,
                     reason: "no turn of an azimuth lies within the soft limits".into(),
                 })?;
-            let tried = match self.shoot(targets, at_rest)? {
-                Ok(tried) => tried,
-                Err(error) => {
-                    self.arms.must_home |= matches!(
-                        &error,
-                        LinkError::Refused {
-                            refusal: RequestRefusal::StartBeyondLimit(_),
-                            ..
-                        }
-                    );
-                    sort_error(index, error)?
-                }
-            };
-            match tried {
-                Try::Latched(latches) => {
-                    let shot = judge(index, retakes, targets, &latches);
+            let error = match self.shoot(targets, at_rest) {
+                Ok(pulses) => {
+                    let shot = shot_of(index, retakes, targets, &pulses);
                     if shot.pointing_error_deg <= POINTING_LIMIT_DEG {
                         return Ok(ShotOutcome::Kept(shot));
                     }
                     reason = format!("pointing error {:.4}°", shot.pointing_error_deg);
+                    continue;
                 }
-                Try::Again(why) => reason = why,
-                Try::Broken(why) => {
+                Err(Missed::AtRest(error)) => return Err(error),
+                Err(Missed::ByArms(error)) => error,
+            };
+            match self.remedy_for(index, error)? {
+                Remedy::Repeat(why) => reason = why,
+                Remedy::Recover(why) => {
                     reason = why;
-                    self.summary.recoveries += 1;
-                    self.arms
-                        .recover()
+                    self.recover()
                         .map_err(|source| SessionError::Arms { index, source })?;
                 }
             }
@@ -290,82 +255,78 @@ impl<'a> Shooter<'a> {
         })
     }
 
-    /// Move, rest, trigger. The outer error is that of `at_rest`.
-    fn shoot(
+    /// Move, rest, trigger: what both arms captured at each pulse.
+    fn shoot<E>(
         &mut self,
-        targets: [[i32; 2]; 2],
-        at_rest: &mut dyn FnMut() -> Result<(), SessionError>,
-    ) -> Result<Result<Try, LinkError>, SessionError> {
+        targets_udeg: [[i32; 2]; 2],
+        at_rest: &mut dyn FnMut() -> Result<(), E>,
+    ) -> Result<Vec<Latched>, Missed<E>> {
         let began = Instant::now();
-        let moved = self.arms.go(targets);
+        let moved = self.arms.go(targets_udeg);
         self.busy += began.elapsed();
-        match moved {
-            Ok(None) => {}
-            Ok(Some(tried)) => return Ok(Ok(tried)),
-            Err(error) => return Ok(Err(error)),
-        }
-        at_rest()?;
+        moved.map_err(Missed::ByArms)?;
+        at_rest().map_err(Missed::AtRest)?;
         let began = Instant::now();
-        let tried = self.arms.trigger();
+        let triggered = self.arms.trigger();
         self.busy += began.elapsed();
-        Ok(tried)
+        triggered.map_err(Missed::ByArms)
     }
-}
 
-/// Which errors of the link a session can get over.
-fn sort_error(index: usize, error: LinkError) -> Result<Try, SessionError> {
-    match &error {
-        LinkError::Refused { refusal, .. } => match refusal {
-            RequestRefusal::TargetBeyondLimit(_) => Err(SessionError::OutOfReach {
-                index,
-                reason: error.to_string(),
-            }),
-            RequestRefusal::OutsideWindow(..) => Ok(Try::Again(error.to_string())),
-            RequestRefusal::NoSession
-            | RequestRefusal::NotHomed
-            | RequestRefusal::NoSuchPulse
-            | RequestRefusal::StartBeyondLimit(_)
-            | RequestRefusal::State(
-                ControllerState::Fault(_) | ControllerState::EStop | ControllerState::Unhomed,
-            ) => Ok(Try::Broken(error.to_string())),
+    /// What helps after a try that gave no shot.
+    ///
+    /// # Errors
+    /// Nothing that a session can do helps.
+    fn remedy_for(&mut self, index: usize, error: TryError) -> Result<Remedy, SessionError> {
+        let error = match error {
+            TryError::Repeat(why) => return Ok(Remedy::Repeat(why)),
+            TryError::Recover(why) => return Ok(Remedy::Recover(why)),
+            TryError::Link(error) => error,
+        };
+        match &error {
+            LinkError::Refused { refusal, .. } => match refusal {
+                RequestRefusal::TargetBeyondLimit(_) => Err(SessionError::OutOfReach {
+                    index,
+                    reason: error.to_string(),
+                }),
+                RequestRefusal::OutsideWindow(..) => Ok(Remedy::Repeat(error.to_string())),
+                RequestRefusal::NoSession
+                | RequestRefusal::NotHomed
+                | RequestRefusal::NoSuchPulse
+                | RequestRefusal::StartBeyondLimit(_)
+                | RequestRefusal::State(
+                    ControllerState::Fault(_) | ControllerState::EStop | ControllerState::Unhomed,
+                ) => {
+                    self.arms.must_home |= matches!(refusal, RequestRefusal::StartBeyondLimit(_));
+                    Ok(Remedy::Recover(error.to_string()))
+                }
+                _ => Err(SessionError::Arms {
+                    index,
+                    source: error.into(),
+                }),
+            },
+            LinkError::NoAnswer { .. } | LinkError::Endless { .. } => {
+                Ok(Remedy::Recover(error.to_string()))
+            }
             _ => Err(SessionError::Arms {
                 index,
                 source: error.into(),
             }),
-        },
-        LinkError::NoAnswer { .. } | LinkError::Endless { .. } => {
-            Ok(Try::Broken(error.to_string()))
         }
-        _ => Err(SessionError::Arms {
-            index,
-            source: error.into(),
-        }),
     }
 }
 
-fn judge(index: usize, retakes: u32, targets: [[i32; 2]; 2], latches: &[Latched]) -> Shot {
-    let mut worst_udeg = 0;
-    for latch in latches {
-        for (target, encoder) in targets
-            .as_flattened()
-            .iter()
-            .zip(latch.encoder_udeg.as_flattened())
-        {
-            worst_udeg = worst_udeg.max(target.abs_diff(*encoder));
-        }
-    }
-    let last = latches.last().map_or(targets, |latch| latch.encoder_udeg);
-    let direction = |[theta, phi]: [i32; 2]| {
-        Direction::from_deg(f64::from(theta) * 1e-6, f64::from(phi) * 1e-6)
-    };
-    Shot {
-        index,
-        encoder: Pose {
-            light: direction(last[0]),
-            view: direction(last[1]),
-        },
-        pointing_error_deg: f64::from(worst_udeg) * 1e-6,
-        retakes,
-        pulse_times_us: latches.iter().map(|latch| latch.time_us).collect(),
-    }
+/// Why a try gave no shot.
+enum Missed<E> {
+    /// The arms, or the link to them.
+    ByArms(TryError),
+    /// The caller, when the arms were at rest.
+    AtRest(E),
+}
+
+/// What a session does after a try that gave no shot; each with the reason.
+enum Remedy {
+    /// The same pose again.
+    Repeat(String),
+    /// The arms are recovered first.
+    Recover(String),
 }

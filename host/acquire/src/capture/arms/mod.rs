@@ -1,43 +1,36 @@
-//! Both arms together: what a session does with them, and how it gets them back after a fault.
+//! Both arms together: what a session does with them, and how it recovers them after a fault.
 
-use gonia_brdf::Pose;
-use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{
-    ControllerState, MAX_PULSES, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
-};
-use gonia_protocol::settings::{Axis, Key};
-use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
+mod recovery;
+mod trigger;
 
 use crate::capture::keep_out;
 use crate::capture::keep_out::Pair;
 use crate::capture::timing::nearest_turn_deg;
-use crate::link::{Controller, HEARTBEAT_US, LinkError, Ticket, Transport, is_uncalibrated};
+use crate::link::{HEARTBEAT_US, LinkError, RemoteController, Ticket, Transport, is_uncalibrated};
+use gonia_brdf::Pose;
+use gonia_protocol::message::{MAX_PULSES, RequestOutcome};
+use gonia_protocol::settings::{Axis, Key};
+use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
+
+pub use recovery::HomeError;
 
 /// Longest homing: the whole travel of φ at the default search speed, and the slow approach, µs.
 const HOMING_LIMIT_US: u64 = 240_000_000;
 /// Longest move: two turns of φ, with every correction, µs.
 const MOVE_LIMIT_US: u64 = 120_000_000;
-/// A follower latches with the pulse; its event is here soon after, µs.
-const FOLLOWER_LIMIT_US: u64 = 300_000;
-/// How long a controller that does not answer is asked again, µs.
-const RECONNECT_LIMIT_US: u64 = 60_000_000;
-
-/// How often bringing the arms back is tried again, and after which pause, µs.
-const RECOVERIES: u32 = 4;
-const PAUSE_US: u64 = 3_000_000;
 
 /// How a session takes its shots.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct ShotOptions {
     /// Exposure times of a shot's pulses, µs: one to eight.
     pub exposures_us: Vec<u32>,
     /// Pause between pulses, µs.
     pub gap_us: u32,
-    /// How often a shot outside the pointing limit, or without its latch, is taken again.
+    /// How often a shot outside the pointing limit, or without its encoders at a pulse, is taken again.
     pub max_retakes: u32,
 }
 
-impl Default for Options {
+impl Default for ShotOptions {
     fn default() -> Self {
         Self {
             exposures_us: vec![10_000],
@@ -49,9 +42,9 @@ impl Default for Options {
 
 /// The light arm and the camera arm.
 pub struct Arms {
-    pub(super) options: Options,
-    light: Controller,
-    camera: Controller,
+    pub(super) options: ShotOptions,
+    light: RemoteController,
+    camera: RemoteController,
     phi_limits_deg: [[f64; 2]; 2],
     /// Directions of light and view nearer to each other than this would make the arms touch.
     pub(super) keep_out_deg: f64,
@@ -61,7 +54,7 @@ pub struct Arms {
     at_udeg: [[i32; 2]; 2],
 }
 
-/// What both controllers latched at a pulse.
+/// What both controllers captured at a pulse.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Latched {
     /// Of light arm and camera arm, µdeg.
@@ -70,28 +63,51 @@ pub(super) struct Latched {
     pub time_us: u64,
 }
 
-/// What came of a try.
+/// Why a move or a trigger gave nothing.
 #[derive(Debug)]
-pub(super) enum Try {
-    /// What was latched at each pulse.
-    Latched(Vec<Latched>),
-    /// Nothing usable; it may be tried again.
-    Again(String),
-    /// A controller has latched a fault, has restarted, or does not answer.
-    Broken(String),
+pub(super) enum TryError {
+    /// Nothing is broken: it may be tried again.
+    Repeat(String),
+    /// A controller has a latched fault, has restarted, or does not answer.
+    Recover(String),
+    /// A request failed.
+    Link(LinkError),
+}
+
+impl From<LinkError> for TryError {
+    fn from(error: LinkError) -> Self {
+        TryError::Link(error)
+    }
+}
+
+impl TryError {
+    /// What it means that something ended otherwise than done.
+    fn of_outcome(what: &str, outcome: RequestOutcome) -> Self {
+        match outcome {
+            RequestOutcome::Failed(code) => TryError::Recover(format!("{what} ended in {code}")),
+            RequestOutcome::LeftWindow(axis) => {
+                TryError::Repeat(format!("{axis:?} left its window during the exposure"))
+            }
+            RequestOutcome::Stopped => TryError::Recover(format!("{what} was stopped")),
+            RequestOutcome::Done => TryError::Repeat(format!("{what} ended early")),
+        }
+    }
 }
 
 impl Arms {
     /// Says hello to both controllers and reads their limits.
+    ///
+    /// # Errors
+    /// A controller does not answer, or speaks another protocol.
     pub fn connect(
         light: Box<dyn Transport>,
         camera: Box<dyn Transport>,
     ) -> Result<Self, LinkError> {
-        let mut light = Controller::connect(light, NODE_LIGHT)?;
-        let mut camera = Controller::connect(camera, NODE_CAMERA)?;
+        let mut light = RemoteController::connect(light, NODE_LIGHT)?;
+        let mut camera = RemoteController::connect(camera, NODE_CAMERA)?;
         let phi_limits_deg = [phi_limits(&mut light)?, phi_limits(&mut camera)?];
         Ok(Self {
-            options: Options::default(),
+            options: ShotOptions::default(),
             light,
             camera,
             phi_limits_deg,
@@ -102,17 +118,17 @@ impl Arms {
     }
 
     /// The light arm's controller.
-    pub fn light(&mut self) -> &mut Controller {
+    pub fn light(&mut self) -> &mut RemoteController {
         &mut self.light
     }
 
     /// The camera arm's controller.
-    pub fn camera(&mut self) -> &mut Controller {
+    pub fn camera(&mut self) -> &mut RemoteController {
         &mut self.camera
     }
 
-    /// The axes whose encoders have no error map: their true angle is not known to the pointing limit,
-    /// whatever the encoder says.
+    /// The axes whose encoders have no error map: their true angle is not known to the pointing limit.
+    /// Each with its arm's name.
     ///
     /// # Errors
     /// The link failed.
@@ -128,7 +144,7 @@ impl Arms {
         Ok(found)
     }
 
-    /// What a person should hear of that before a session; nothing when all is well.
+    /// The warning about such axes that a person should read before a session; `None` when there are none.
     ///
     /// # Errors
     /// The link failed.
@@ -164,7 +180,7 @@ impl Arms {
     ///
     /// # Errors
     /// No exposure, more than [`MAX_PULSES`] of them, or one of no length.
-    pub fn set_options(&mut self, options: Options) -> Result<(), BadExposures> {
+    pub fn set_options(&mut self, options: ShotOptions) -> Result<(), BadExposures> {
         let times = &options.exposures_us;
         if !(1..=MAX_PULSES).contains(&times.len()) || times.contains(&0) {
             return Err(BadExposures(times.len()));
@@ -182,6 +198,9 @@ impl Arms {
     }
 
     /// Homes those arms that do not know where they are, both at once.
+    ///
+    /// # Errors
+    /// The link failed, or homing ended in a fault or a stop.
     pub fn home(&mut self) -> Result<(), HomeError> {
         let mut tickets = [None; 2];
         let must_home = self.must_home;
@@ -207,7 +226,10 @@ impl Arms {
         Ok(())
     }
 
-    /// Stops both arms, gently. Tries both even when one does not answer.
+    /// Decelerates and stops both arms. Tries both even when one does not answer.
+    ///
+    /// # Errors
+    /// A controller did not answer.
     pub fn stop(&mut self) -> Result<(), LinkError> {
         let light = self.light.stop();
         self.camera.stop()?;
@@ -257,24 +279,21 @@ impl Arms {
         Some(legs.into_iter().map(udeg).collect())
     }
 
-    /// Moves both arms, clear of each other, and waits until both are at rest; what went wrong, if
-    /// anything did.
-    pub(super) fn go(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
+    /// Moves both arms, clear of each other, and waits until both are at rest.
+    pub(super) fn go(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<(), TryError> {
         let Some(legs) = self.legs_udeg(targets_udeg) else {
             let angle = self.keep_out_deg;
             let reason = format!("no way there keeps the arms {angle:.1}° apart");
-            return Ok(Some(Try::Again(reason)));
+            return Err(TryError::Repeat(reason));
         };
         for leg in legs {
-            if let Some(tried) = self.go_straight(leg)? {
-                return Ok(Some(tried));
-            }
+            self.go_straight(leg)?;
         }
-        Ok(None)
+        Ok(())
     }
 
     /// A single leg.
-    fn go_straight(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<Option<Try>, LinkError> {
+    fn go_straight(&mut self, targets_udeg: [[i32; 2]; 2]) -> Result<(), TryError> {
         let mut tickets = [None; 2];
         for ((controller, target), ticket) in
             self.both().into_iter().zip(targets_udeg).zip(&mut tickets)
@@ -284,146 +303,18 @@ impl Arms {
         self.at_udeg = targets_udeg;
         for outcome in self.wait_for(tickets, MOVE_LIMIT_US)?.into_iter().flatten() {
             if outcome != RequestOutcome::Done {
-                return Ok(Some(ended_badly("a move", outcome)));
+                return Err(TryError::of_outcome("a move", outcome));
             }
         }
-        Ok(None)
+        Ok(())
     }
 
-    /// Triggers, and collects the latches.
-    pub(super) fn trigger(&mut self) -> Result<Try, LinkError> {
-        let exposures_us: heapless::Vec<u32, MAX_PULSES> =
-            self.options.exposures_us.iter().copied().collect();
-        let pulses = exposures_us.len() as u8;
-        let arm = |trigger| TriggerRequest {
-            trigger,
-            exposures_us: exposures_us.clone(),
-            gap_us: self.options.gap_us,
-        };
-        let (follower, source) = (arm(TriggerRole::Follower), arm(TriggerRole::Source));
-        let following = self.light.request_trigger(follower)?;
-        let length_us: u64 = self
-            .options
-            .exposures_us
-            .iter()
-            .map(|&us| u64::from(us))
-            .sum();
-        let limit_us = length_us + 8 * u64::from(self.options.gap_us) + 1_000_000;
-        let fired = self
-            .camera
-            .request_trigger(source)
-            .and_then(|_| self.camera.fire());
-        let given = fired.and_then(|ticket| self.wait_for([None, Some(ticket)], limit_us));
-        match given {
-            Ok([_, Some(RequestOutcome::Done)]) => {}
-            Ok([_, outcome]) => {
-                self.disarm()?;
-                return Ok(outcome.map_or(Try::Again("no trigger".into()), |outcome| {
-                    ended_badly("the trigger", outcome)
-                }));
-            }
-            Err(error) => {
-                self.disarm()?;
-                return Err(error);
-            }
-        }
-        match self.light.wait(following, FOLLOWER_LIMIT_US) {
-            Ok(completed) if completed.outcome == RequestOutcome::Done => {}
-            Ok(completed) => return Ok(ended_badly("the trigger", completed.outcome)),
-            Err(LinkError::Endless { .. }) => {
-                self.disarm()?;
-                return Ok(Try::Again("the light arm did not see the trigger".into()));
-            }
-            Err(error) => return Err(error),
-        }
-        let mut latches = Vec::new();
-        for pulse in 0..pulses {
-            let pair = [self.light.latch(pulse)?, self.camera.latch(pulse)?];
-            if !pair.iter().all(|latch| latch.within) {
-                return Ok(Try::Again(
-                    "an arm was outside its window at the trigger".into(),
-                ));
-            }
-            let time_us = pair[1].time_us;
-            latches.push(Latched {
-                encoder_udeg: pair.map(|latch| latch.encoder_udeg),
-                time_us,
-            });
-        }
-        Ok(Try::Latched(latches))
-    }
-
-    /// Brings both controllers back after a fault, a restart or a lost cable: hello, clear, home
-    /// where needed.
-    /// What may pass, such as another fault on the way home, is got over too, a few times.
-    pub(super) fn recover(&mut self) -> Result<(), HomeError> {
-        let mut tries_left = RECOVERIES;
-        loop {
-            match self.recover_once() {
-                Err(error) if tries_left > 0 && error.may_pass() => {
-                    tries_left -= 1;
-                    self.light.rest(PAUSE_US)?;
-                }
-                result => return result,
-            }
-        }
-    }
-
-    fn recover_once(&mut self) -> Result<(), HomeError> {
-        let deadline_us = self.now_us() + RECONNECT_LIMIT_US;
-        for controller in self.both() {
-            let config = controller.identity().config_crc;
-            while let Err(error) = controller.reconnect() {
-                let silent = matches!(error, LinkError::NoAnswer { .. });
-                if !silent || controller.now_us() > deadline_us {
-                    return Err(error.into());
-                }
-            }
-            if controller.identity().config_crc != config {
-                return Err(HomeError::OtherSettings(controller.name().to_owned()));
-            }
-        }
-        for controller in self.both() {
-            // The arm may still be slowing down, or be armed, or be under way to the last target.
-            controller.stop()?;
-            loop {
-                match controller.status()?.state {
-                    ControllerState::EStop => {
-                        return Err(HomeError::Stopped(controller.name().to_owned()));
-                    }
-                    ControllerState::Fault(code) => match controller.clear_fault() {
-                        Err(LinkError::Refused {
-                            refusal: RequestRefusal::State(_),
-                            ..
-                        }) => {}
-                        Err(LinkError::Refused { .. }) => {
-                            return Err(HomeError::Fault(controller.name().to_owned(), code));
-                        }
-                        other => other?,
-                    },
-                    ControllerState::Idle | ControllerState::Unhomed => break,
-                    _ => {}
-                }
-                if controller.now_us() > deadline_us {
-                    return Err(HomeError::Stopped(controller.name().to_owned()));
-                }
-                controller.rest(HEARTBEAT_US / 10)?;
-            }
-        }
-        self.home()
-    }
-
-    fn disarm(&mut self) -> Result<(), LinkError> {
-        self.light.disarm()?;
-        self.camera.disarm()
-    }
-
-    fn both(&mut self) -> [&mut Controller; 2] {
+    fn both(&mut self) -> [&mut RemoteController; 2] {
         [&mut self.light, &mut self.camera]
     }
 
     /// Where the arms are, or rather the nearest places that they may be sent to: an arm parks at its
-    /// lowest angle, give or take the deadband.
+    /// lowest angle, give or take the in-position window.
     fn positions_udeg(&mut self) -> Result<[[i32; 2]; 2], LinkError> {
         let mut at = [[0; 2]; 2];
         for (controller, at) in self.both().into_iter().zip(&mut at) {
@@ -439,7 +330,7 @@ impl Arms {
         Ok(at)
     }
 
-    /// Waits for both arms, and keeps the lease of the one that is not being listened to.
+    /// Waits for both arms, and renews the host watchdog of the one that is not being listened to.
     fn wait_for(
         &mut self,
         tickets: [Option<Ticket>; 2],
@@ -474,66 +365,7 @@ impl Arms {
 #[error("{0} exposures given; give 1 to {MAX_PULSES}, each longer than 0 µs")]
 pub struct BadExposures(usize);
 
-/// Why the arms are not ready.
-#[derive(Debug, thiserror::Error)]
-pub enum HomeError {
-    /// The link failed.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// A fault that does not go away.
-    #[error("{0}: {1}")]
-    Fault(String, FaultCode),
-    /// Somebody stopped the arm.
-    #[error("{0}: stopped by hand or by the interlock; make it safe, clear the fault and resume")]
-    Stopped(String),
-    /// The controller came back with other settings.
-    #[error(
-        "{0}: came back with other settings than the session began with; restore them and resume"
-    )]
-    OtherSettings(String),
-}
-
-impl HomeError {
-    /// Whether it may be gone at the next try. A person's stop, other settings and a switch that does
-    /// not switch do not go away by themselves; a noisy encoder looks like a shifted one while it lasts.
-    pub(super) fn may_pass(&self) -> bool {
-        match self {
-            HomeError::Fault(_, code) => matches!(
-                *code,
-                FaultCode::ENCODER_LOST
-                    | FaultCode::ENCODER_JUMP
-                    | FaultCode::FOLLOWING_ERROR
-                    | FaultCode::NOT_REACHED
-                    | FaultCode::HOST_WATCHDOG
-                    | FaultCode::STEP_LOSS
-                    | FaultCode::HOME_MISMATCH
-            ),
-            HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
-                refusal,
-                RequestRefusal::NoSession
-                    | RequestRefusal::State(ControllerState::Fault(_) | ControllerState::Boot)
-            ),
-            HomeError::Link(error) => matches!(
-                error,
-                LinkError::NoAnswer { .. } | LinkError::Endless { .. }
-            ),
-            HomeError::Stopped(_) | HomeError::OtherSettings(_) => false,
-        }
-    }
-}
-
-fn ended_badly(what: &str, outcome: RequestOutcome) -> Try {
-    match outcome {
-        RequestOutcome::Failed(code) => Try::Broken(format!("{what} ended in {code}")),
-        RequestOutcome::LeftWindow(axis) => {
-            Try::Again(format!("{axis:?} left its window during the exposure"))
-        }
-        RequestOutcome::Stopped => Try::Broken(format!("{what} was stopped")),
-        RequestOutcome::Done => Try::Again(format!("{what} ended early")),
-    }
-}
-
-fn phi_limits(controller: &mut Controller) -> Result<[f64; 2], LinkError> {
+fn phi_limits(controller: &mut RemoteController) -> Result<[f64; 2], LinkError> {
     let mut limit = |key| {
         controller
             .setting(Axis::Phi, key)

@@ -1,9 +1,9 @@
-//! Where frames become samples while the arms move on: one thread fetches them from the camera, one
-//! registers, samples and keeps them.
+//! Frames become samples while the arms move on: one thread fetches them from the camera, one registers,
+//! samples and keeps them.
 
 use crate::camera::{Camera, CameraError, Pulse};
 use crate::capture::control::Comparison;
-use crate::capture::watch::{Told, Watch};
+use crate::capture::watch::{SessionEvent, Watch};
 use crate::session::{PoseDone, SessionWriter};
 use gonia_formats::FileError;
 use gonia_formats::frame_exr::write_frame;
@@ -19,7 +19,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub struct Task {
     /// Its place in the plan.
     pub index: usize,
-    /// How often it was tried in vain.
+    /// How often it was tried without a sample.
     pub tries: u32,
     /// Taken only to be compared with its first take.
     pub is_control: bool,
@@ -38,28 +38,49 @@ pub struct Taken {
     pub pointing_deg: f64,
 }
 
-/// What the desk is given.
+/// What the worker is sent.
 pub enum Work {
     /// A frame. It is sampled, and kept only once it is confirmed.
     Frame(Taken, Frame),
     /// The last frame belongs to its trigger.
     Confirm,
-    /// It may not.
-    Void,
+    /// It may not: it is discarded.
+    Discard,
 }
 
-/// What the arms' thread is told.
-pub enum News {
-    /// The camera is free again, and gave a frame or not.
-    Camera(Result<(), CameraError>),
-    /// A pose is done. The flag: it is what control poses are compared with from now on.
-    Kept(PoseDone, bool),
-    /// The frame does not show its target; another take may.
-    Again(Task, String),
+/// How a fetch from the camera ended.
+pub enum Fetched {
+    /// With a frame.
+    Frame,
+    /// Without one.
+    Nothing(CameraError),
+}
+
+/// A take of the control pose.
+pub enum ControlTake {
+    /// How it compares with the first take.
+    Compared(Comparison),
+    /// Its fiducial lines are not seen, or it has no point in common with the first take.
+    Unusable,
+}
+
+/// What the arms' thread is sent.
+pub enum WorkerEvent {
+    /// The camera is free again.
+    Fetched(Fetched),
+    /// A pose is done.
+    Kept {
+        /// Its line in the journal.
+        done: PoseDone,
+        /// Control poses are compared with it from now on.
+        is_baseline: bool,
+    },
+    /// The frame does not show its target; another take may. With the reason.
+    Repeat(Task, String),
     /// The disk did not take it.
     NotKept(Task, FileError),
-    /// How the control pose compares; `None` when it shows nothing to compare.
-    Compared(Option<Comparison>),
+    /// The control pose was taken.
+    Control(ControlTake),
 }
 
 /// Fetches a frame for every shot.
@@ -67,37 +88,37 @@ pub fn fetch_all(
     camera: &Mutex<Box<dyn Camera>>,
     shots: &Receiver<Taken>,
     work: &SyncSender<Work>,
-    news: &Sender<News>,
+    events: &Sender<WorkerEvent>,
 ) {
     for taken in shots {
         let fetched = lock(camera).fetch(&taken.row, &taken.pulses);
-        let told = match fetched {
+        let fetched = match fetched {
             Ok(frame) => {
                 if work.send(Work::Frame(taken, frame)).is_err() {
                     return;
                 }
-                Ok(())
+                Fetched::Frame
             }
-            Err(error) => Err(error),
+            Err(error) => Fetched::Nothing(error),
         };
-        if news.send(News::Camera(told)).is_err() {
+        if events.send(WorkerEvent::Fetched(fetched)).is_err() {
             return;
         }
     }
 }
 
 /// A frame, and what it shows.
-struct Looked {
+struct SampledShot {
     frame: Frame,
     registration: Registration,
     sampled: SampledFrame,
 }
 
 /// Samples and keeps frames.
-pub struct Desk<'a> {
+pub struct FrameWorker<'a> {
     /// Of the session's rig.
     pub sampler: FrameSampler,
-    /// Whether the reference's frames tell what hides the target.
+    /// Whether the reference's frames show what hides the target.
     pub has_reference: bool,
     /// Where samples go.
     pub writer: &'a Mutex<SessionWriter>,
@@ -109,10 +130,10 @@ pub struct Desk<'a> {
     pub watch: &'a dyn Watch,
 }
 
-impl Desk<'_> {
-    /// Works until there is no more work.
-    pub fn work(&mut self, work: &Receiver<Work>, news: &Sender<News>) {
-        let mut held: Option<(Taken, Looked)> = None;
+impl FrameWorker<'_> {
+    /// Works until all senders of work are gone.
+    pub fn work(&mut self, work: &Receiver<Work>, events: &Sender<WorkerEvent>) {
+        let mut held: Option<(Taken, SampledShot)> = None;
         for item in work {
             match item {
                 Work::Frame(taken, frame) => {
@@ -122,17 +143,17 @@ impl Desk<'_> {
                     };
                     let (sampled, registration) =
                         self.sampler.sample_registered(&frame, &taken.row, hidden);
-                    let looked = Looked {
+                    let shot = SampledShot {
                         frame,
                         registration,
                         sampled,
                     };
-                    held = Some((taken, looked));
+                    held = Some((taken, shot));
                 }
-                Work::Void => held = None,
+                Work::Discard => held = None,
                 Work::Confirm => {
-                    if let Some((taken, looked)) = held.take()
-                        && news.send(self.take_in(taken, &looked)).is_err()
+                    if let Some((taken, shot)) = held.take()
+                        && events.send(self.keep(taken, &shot)).is_err()
                     {
                         return;
                     }
@@ -141,47 +162,50 @@ impl Desk<'_> {
         }
     }
 
-    fn take_in(&mut self, taken: Taken, looked: &Looked) -> News {
-        let Looked { frame, sampled, .. } = looked;
-        self.watch.tell(&Told::Frame {
+    fn keep(&mut self, taken: Taken, shot: &SampledShot) -> WorkerEvent {
+        let SampledShot { frame, sampled, .. } = shot;
+        self.watch.on_event(&SessionEvent::Frame {
             frame,
-            registration: &looked.registration,
+            registration: &shot.registration,
             sampled,
         });
         let is_locked = sampled.report.outcome == Outcome::Locked;
         if taken.task.is_control {
             let first = self.baseline.as_ref().filter(|_| is_locked);
-            return News::Compared(first.and_then(|first| Comparison::of(first, sampled)));
+            let comparison = first.and_then(|first| Comparison::of(first, sampled));
+            return WorkerEvent::Control(
+                comparison.map_or(ControlTake::Unusable, ControlTake::Compared),
+            );
         }
         if let Outcome::Refused(refusal) = sampled.report.outcome
             && taken.task.tries == 0
         {
-            return News::Again(taken.task, refusal.to_string());
+            return WorkerEvent::Repeat(taken.task, refusal.to_string());
         }
         if let Some(folder) = &self.frames
             && let Err(error) = write_frame(&folder.join(&taken.row.file), frame)
         {
-            return News::NotKept(taken.task, error);
+            return WorkerEvent::NotKept(taken.task, error);
         }
         let kept = lock(self.writer).keep(sampled, taken.pointing_deg);
         match kept {
-            Err(error) => News::NotKept(taken.task, error),
+            Err(error) => WorkerEvent::NotKept(taken.task, error),
             Ok(done) => {
                 let is_baseline = self.baseline.is_none() && is_locked;
                 if is_baseline {
                     self.baseline = Some(sampled.clone());
                 }
-                self.watch.tell(&Told::Pose {
+                self.watch.on_event(&SessionEvent::Pose {
                     done: &done,
                     frame: sampled,
                 });
-                News::Kept(done, is_baseline)
+                WorkerEvent::Kept { done, is_baseline }
             }
         }
     }
 }
 
-/// A thread that panicked elsewhere does not make the other's things unusable.
+/// Locks also what a thread held that panicked.
 pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
