@@ -67,6 +67,7 @@ impl Watch for Printer {
 }
 
 /// Measures six poses into a folder; the radiance of a point in the first frame.
+// long: a whole session from the arms to its folder, to be read from top to bottom.
 fn measure(folder: &Path) -> Result<[f32; 3], Box<dyn Error>> {
     // A rig with small frames, and a plan. Both usually come from files.
     let mut rig = Rig::paper(100);

@@ -29,6 +29,7 @@ fn text_of(id: &str) -> String {
 
 #[test]
 #[ignore = "needs a browser; cargo xtask test runs it"]
+// long: one session, watched from its first pose to its end.
 fn the_page_opens_without_an_error_its_map_fills_and_its_button_pauses() {
     let folder = tempfile::tempdir().unwrap();
     let mut rig = small_rig();

@@ -111,6 +111,7 @@ fn sessions_survive_two_hundred_kills() {
 }
 
 #[test]
+// long: one session, and every command that may meet it.
 fn a_session_makes_samples_and_what_does_not_fit_it_is_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -341,6 +342,7 @@ fn real_bench(folder: &Path, poses: usize) -> (Bench, Vec<String>) {
 
 #[test]
 #[cfg(unix)]
+// long: one session, interrupted twice and resumed.
 fn a_second_ctrl_c_stops_moving_arms_now_and_other_settings_are_refused_afterwards() {
     let folder = tempfile::tempdir().unwrap();
     let (_bench, command) = real_bench(folder.path(), 4);

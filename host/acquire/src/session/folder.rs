@@ -3,12 +3,13 @@
 use crate::session::entry::{End, Entry, PoseDone};
 use crate::session::journal::Lines;
 use crate::session::provenance::Provenance;
-use crate::session::{crc32c, journal, record};
+use crate::session::{journal, record};
 use gonia_brdf::Pose;
 use gonia_formats::FileError;
 use gonia_formats::plan_csv::read_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_pipeline::process::SampledFrame;
+use gonia_protocol::crc32c;
 use gonia_rig::{FrameRow, Rig, Role};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry as Place;

@@ -6,9 +6,10 @@
 //! The checksum is of everything before ` #`. Lines are numbered from 0, so that a missing one is
 //! noticed.
 
+use crate::session::clock;
 use crate::session::entry::Entry;
-use crate::session::{clock, crc32c};
 use gonia_formats::FileError;
+use gonia_protocol::crc32c;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -26,9 +26,3 @@ pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 pub use provenance::{ControllerIdentity, Provenance};
 pub use verify::{Finding, Verdict, verify};
 pub use writer::{Beginning, Claim, SessionWriter};
-
-/// CRC-32C, the checksum of the wire and of everything here.
-fn crc32c(bytes: &[u8]) -> u32 {
-    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
-    CRC.checksum(bytes)
-}
