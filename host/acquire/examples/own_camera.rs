@@ -11,7 +11,7 @@ use gonia_acquire::capture::{
     Arms, Orders, SessionEvent, UnattendedSession, Watch, free_mb, simulated_arms,
 };
 use gonia_acquire::session::{
-    Beginning, Claim, ControllerIdentity, Entry, Provenance, SessionFolder, verify,
+    Beginning, Claim, ControllerIdentity, Entry, SessionFolder, SessionProvenance, verify,
 };
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
@@ -105,7 +105,7 @@ fn measure(folder: &Path) -> Result<[f32; 3], Box<dyn Error>> {
     let given = tempfile::tempdir()?;
     let path = given.path().join("rig.toml");
     write_rig(&path, &rig)?;
-    let provenance = Provenance {
+    let provenance = SessionProvenance {
         program: "own_camera".to_owned(),
         began: String::new(),
         rig_crc: String::new(),

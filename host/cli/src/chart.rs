@@ -9,7 +9,7 @@ use gonia_formats::samples::read_samples;
 use gonia_formats::{check_writable, write_whole_bytes};
 use gonia_pipeline::chart;
 use gonia_pipeline::chart::{
-    Method, Point, Split, Subset, TestCounts, TestSet, front, standard, to_csv,
+    ChartPoint, FrameSubset, Method, Split, TestCounts, TestSet, front, standard, to_csv,
 };
 use gonia_report::frontier;
 use gonia_rig::Stratum;
@@ -78,7 +78,7 @@ impl Chart {
         println!("compared with {}", tests.basis());
         if self.only != Some(Only::Images) {
             let bins = Bins::new(grid, &samples);
-            let frames = Subset::all_of(&samples)[0].frames();
+            let frames = FrameSubset::all_of(&samples)[0].frames();
             let compared = self.compared(grid);
             let points = progress.stage("measuring methods", |tell| {
                 chart::methods(&bins, frames, &compared, &tests, tell)
@@ -94,7 +94,7 @@ impl Chart {
         if self.only != Some(Only::Methods) {
             let compared = [Method::default_of(grid), Method::paper()];
             let points = progress.stage("measuring fewer images", |tell| {
-                chart::images(&Subset::all_of(&samples), &compared, &tests, tell)
+                chart::images(&FrameSubset::all_of(&samples), &compared, &tests, tell)
             })?;
             print_points(&points);
             let title = title(path, "error against images");
@@ -137,7 +137,7 @@ impl Chart {
         self.methods.clone()
     }
 
-    fn write(&self, name: &str, points: &[Point], svg: &str) -> Result<()> {
+    fn write(&self, name: &str, points: &[ChartPoint], svg: &str) -> Result<()> {
         let file = |extension| self.out.join(name).with_extension(extension);
         write_whole_bytes(&file("svg"), svg.as_bytes())?;
         write_whole_bytes(&file("csv"), to_csv(points).as_bytes())?;
@@ -152,8 +152,8 @@ fn title(path: &Path, what: &str) -> String {
 }
 
 /// The main figures, cheapest first; a star marks the Pareto front over all cells.
-fn print_points(points: &[Point]) {
-    let of = |point: &Point, stratum| {
+fn print_points(points: &[ChartPoint]) {
+    let of = |point: &ChartPoint, stratum| {
         let row = point.strata.iter().find(|row| row.stratum == stratum);
         row.copied()
     };

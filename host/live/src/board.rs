@@ -4,7 +4,7 @@ use crate::filled::Filled;
 use crate::slice::Slice;
 use crate::thumbnail::Thumbnail;
 use gonia_acquire::capture::{POINTING_LIMIT_DEG, Pace, SessionEvent};
-use gonia_acquire::session::End;
+use gonia_acquire::session::SessionEnd;
 use gonia_brdf::Pose;
 use gonia_pipeline::process::{Outcome, SampledFrame};
 use gonia_rig::{Rig, Role};
@@ -74,7 +74,7 @@ pub struct Board {
     drawn: Option<Instant>,
     last: Option<LastFrame>,
     notes: VecDeque<Note>,
-    ended: Option<(End, String)>,
+    ended: Option<(SessionEnd, String)>,
 }
 
 /// What is sent: all of it, or what is newer than a version. Angles in degrees.
@@ -223,7 +223,7 @@ impl Board {
     }
 
     /// The session is over.
-    pub fn end(&mut self, end: End, reason: &str) {
+    pub fn end(&mut self, end: SessionEnd, reason: &str) {
         self.version += 1;
         self.phase = "ended";
         self.current = None;
@@ -470,7 +470,7 @@ mod tests {
             (&"material".into(), &"held".into())
         );
         assert!(begun["poses"].as_array().unwrap().iter().all(|p| p[1] == 0));
-        board.end(End::Failed, "the lamp is out");
+        board.end(SessionEnd::Failed, "the lamp is out");
         let (_, ended) = update(&board, 0);
         assert_eq!(
             ended["ended"],

@@ -15,7 +15,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_core::Stream;
 use gonia_acquire::capture::{Orders, SessionEvent, Watch};
-use gonia_acquire::session::{End, SessionFolder};
+use gonia_acquire::session::{SessionEnd, SessionFolder};
 use gonia_formats::FileError;
 use gonia_rig::Target;
 use std::convert::Infallible;
@@ -195,7 +195,7 @@ impl LivePage {
     }
 
     /// The session is over: the page says how.
-    pub fn end(&self, end: End, reason: &str) {
+    pub fn end(&self, end: SessionEnd, reason: &str) {
         self.shared.change(|board| board.end(end, reason));
     }
 }

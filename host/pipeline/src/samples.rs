@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::process::{
-    FrameSource, Hidden, Masks, Outcome, ProcessError, Processed, Sampled, Stage, process,
+    FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, Sampled, process,
     process_sampled,
 };
 use crate::progress::{Progress, Step, step};
@@ -59,7 +59,7 @@ fn watched(
     rows: &[FrameRow],
     progress: &Progress<'_>,
     work: impl FnOnce(
-        &(dyn Fn(Stage, usize) -> ControlFlow<()> + Sync),
+        &(dyn Fn(FrameStage, usize) -> ControlFlow<()> + Sync),
     ) -> Result<Processed, ProcessError>,
 ) -> Result<Processed, Error> {
     let reference = rows
@@ -70,8 +70,8 @@ fn watched(
     let processed = step(progress, Step::FramesToSamples, |_| {
         work(&|stage, done| {
             let before = match stage {
-                Stage::Reference => 0,
-                Stage::Material => reference,
+                FrameStage::Reference => 0,
+                FrameStage::Material => reference,
             };
             let share = (before + done) as f64 / total;
             // The last frame is not the end of the step.

@@ -2,14 +2,14 @@
 //! front; and error against the number of images.
 
 use gonia_brdf::interpolate::Preset;
-use gonia_pipeline::chart::{Family, Method, Point, front};
+use gonia_pipeline::chart::{ChartPoint, Family, Method, front};
 use gonia_render::svg;
 use gonia_rig::{Stratum, StratumFigures};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 
 /// An error figure of a point, where it has it.
-type Figure = fn(&Point) -> Option<f64>;
+type Figure = fn(&ChartPoint) -> Option<f64>;
 
 /// Panels: heading and figure.
 const PANELS: [(&str, Figure); 6] = [
@@ -29,7 +29,7 @@ const PANELS: [(&str, Figure); 6] = [
     ("ΔE00, rendered sphere", |p| p.sphere_delta_e),
 ];
 
-fn of(point: &Point, stratum: Stratum, figure: fn(&StratumFigures) -> f64) -> Option<f64> {
+fn of(point: &ChartPoint, stratum: Stratum, figure: fn(&StratumFigures) -> f64) -> Option<f64> {
     let row = point.strata.iter().find(|row| row.stratum == stratum)?;
     Some(figure(row))
 }
@@ -72,8 +72,8 @@ fn class(family: Family) -> &'static str {
 }
 
 /// Error against core-seconds, as one SVG file; `basis` says what is compared with what.
-pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
-    let cost = |p: &Point| Some(p.core_s);
+pub fn methods(points: &[ChartPoint], title: &str, basis: &str) -> String {
+    let cost = |p: &ChartPoint| Some(p.core_s);
     page(
         points,
         (title, basis),
@@ -86,11 +86,11 @@ pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
                 .filter_map(|k| chart.place(&points[*k]))
                 .collect();
             // Blocks between the presets have theirs when pointed at: side by side there is no room.
-            let worth_a_name = |k: usize, p: &Point| {
+            let worth_a_name = |k: usize, p: &ChartPoint| {
                 let on_front = along.contains(&k) && p.family != Family::Blocks;
                 on_front || p.is_default || p.name == "paper" || preset_of(&p.name).is_some()
             };
-            let named: Vec<(&Point, String)> = points
+            let named: Vec<(&ChartPoint, String)> = points
                 .iter()
                 .enumerate()
                 .filter(|(k, point)| worth_a_name(*k, point))
@@ -107,16 +107,16 @@ pub fn methods(points: &[Point], title: &str, basis: &str) -> String {
 
 /// Error against the number of images, as one SVG file. A series holds the points that differ only
 /// in the samples; those of central samples only are squares.
-pub fn images(points: &[Point], title: &str, basis: &str) -> String {
-    let frames = |p: &Point| Some(p.frames as f64);
+pub fn images(points: &[ChartPoint], title: &str, basis: &str) -> String {
+    let frames = |p: &ChartPoint| Some(p.frames as f64);
     page(points, (title, basis), "images", frames, &|chart| {
-        let mut series: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
+        let mut series: BTreeMap<&str, Vec<&ChartPoint>> = BTreeMap::new();
         for point in points.iter().filter(|p| !is_central(p)) {
             series.entry(method_of(point)).or_default().push(point);
         }
         let last = series.values().filter_map(|points| points.last());
         let central = points.iter().filter(|p| is_central(p));
-        let named: Vec<(&Point, String)> = last
+        let named: Vec<(&ChartPoint, String)> = last
             .map(|point| (*point, label(method_of(point))))
             .chain(central.map(|point| (point, "central only".to_owned())))
             .collect();
@@ -154,11 +154,11 @@ fn label(name: &str) -> String {
         .replace(",budget=", ", b=")
 }
 
-fn method_of(point: &Point) -> &str {
+fn method_of(point: &ChartPoint) -> &str {
     point.name.split(" from ").next().unwrap_or_default()
 }
 
-fn is_central(point: &Point) -> bool {
+fn is_central(point: &ChartPoint) -> bool {
     point.name.contains("central")
 }
 
@@ -170,10 +170,10 @@ fn polyline(points: &[(f64, f64)]) -> String {
 }
 
 fn page(
-    points: &[Point],
+    points: &[ChartPoint],
     (title, basis): (&str, &str),
     axis: &str,
-    along: fn(&Point) -> Option<f64>,
+    along: fn(&ChartPoint) -> Option<f64>,
     inside: &dyn Fn(&Panel) -> Markup,
 ) -> String {
     let panels: Vec<Panel> = PANELS
@@ -214,7 +214,7 @@ fn page(
 /// A panel with logarithmic axes.
 struct Panel {
     name: &'static str,
-    along: fn(&Point) -> Option<f64>,
+    along: fn(&ChartPoint) -> Option<f64>,
     error: Figure,
     /// Powers of ten at the ends of the axes.
     x: (f64, f64),
@@ -224,12 +224,12 @@ struct Panel {
 impl Panel {
     /// `None` when no point has the figure.
     fn new(
-        points: &[Point],
+        points: &[ChartPoint],
         name: &'static str,
-        along: fn(&Point) -> Option<f64>,
+        along: fn(&ChartPoint) -> Option<f64>,
         error: Figure,
     ) -> Option<Self> {
-        let range = |figure: &dyn Fn(&Point) -> Option<f64>| {
+        let range = |figure: &dyn Fn(&ChartPoint) -> Option<f64>| {
             let logs = points.iter().filter_map(figure).map(f64::log10);
             let (low, high) = logs
                 .filter(|log| log.is_finite())
@@ -257,7 +257,7 @@ impl Panel {
         TOP + (self.y.1 - log) / (self.y.1 - self.y.0) * (H - TOP - BOTTOM)
     }
 
-    fn place(&self, point: &Point) -> Option<(f64, f64)> {
+    fn place(&self, point: &ChartPoint) -> Option<(f64, f64)> {
         let (x, y) = ((self.along)(point)?.log10(), (self.error)(point)?.log10());
         (x.is_finite() && y.is_finite()).then(|| (self.x_of(x), self.y_of(y)))
     }
@@ -280,7 +280,7 @@ impl Panel {
         }
     }
 
-    fn dot(&self, point: &Point) -> Markup {
+    fn dot(&self, point: &ChartPoint) -> Markup {
         let Some((x, y)) = self.place(point) else {
             return html! {};
         };
@@ -300,7 +300,7 @@ impl Panel {
     }
 
     /// Names beside their points, each as near to its own as other names and points leave room.
-    fn names(&self, named: &[(&Point, String)], points: &[Point]) -> Markup {
+    fn names(&self, named: &[(&ChartPoint, String)], points: &[ChartPoint]) -> Markup {
         /// Height and mean width of a letter.
         const LETTER: (f64, f64) = (10.0, 4.9);
         // What is taken: left, right, top and bottom.
@@ -376,8 +376,8 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn point(name: &str, core_s: f64, log_rms: f64) -> Point {
-        Point {
+    fn point(name: &str, core_s: f64, log_rms: f64) -> ChartPoint {
+        ChartPoint {
             name: name.into(),
             family: Family::Rbf,
             is_default: name == "a",
@@ -439,7 +439,7 @@ mod tests {
         assert_eq!(label(&default), "default");
         assert_eq!(label("paper"), "paper");
         // Four points of a front within a few pixels.
-        let points: Vec<Point> = (0..4)
+        let points: Vec<ChartPoint> = (0..4)
             .map(|k| {
                 let k = f64::from(k);
                 point(&format!("method {k}"), 10.0 + 0.1 * k, 0.1 - 0.001 * k)

@@ -3,7 +3,7 @@
 use gonia_protocol::message::RequestOutcome;
 use gonia_protocol::settings::{Axis, Key};
 
-use crate::link::error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
+use crate::link::error_map::{ErrorMapFit, MapFitError, Reading, fit_error_map};
 use crate::link::gear_map::{GearMapFit, GearReading, fit_gear_map};
 use crate::link::{LinkError, RemoteController, Ticket};
 
@@ -22,7 +22,7 @@ const STEP_LOSS_LIMIT_UDEG: i32 = 10_000;
 
 /// What a calibration has found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Calibration {
+pub struct EncoderCalibration {
     /// The encoder's error over the turn.
     pub encoder: ErrorMapFit,
     /// The gear's over a turn of the worm; `None` where the stands do not tell.
@@ -39,7 +39,7 @@ pub enum CalibrateError {
     Link(#[from] LinkError),
     /// The readings make no map.
     #[error(transparent)]
-    Fit(#[from] FitError),
+    Fit(#[from] MapFitError),
     /// A move or homing did not end well.
     #[error("{arm}: {what} ended in {outcome:?}; clear the fault and begin again")]
     Ended {
@@ -69,7 +69,7 @@ pub fn calibrate_axis(
     stands_udeg: &[i32],
     is_absolute: bool,
     reference: &mut dyn FnMut(&mut RemoteController, f64) -> Result<f64, String>,
-) -> Result<Calibration, CalibrateError> {
+) -> Result<EncoderCalibration, CalibrateError> {
     // Of both axes: the other one may not be calibrated yet, and homing homes both.
     let mut guards = Vec::new();
     for key in [Key::HomeTolerance, Key::StepLossLimit] {
@@ -136,7 +136,7 @@ pub fn calibrate_axis(
         _ => before_udeg.max(Key::StepLossLimit.default_of(axis)),
     };
     arm.set_setting(axis, Key::StepLossLimit, step_loss_limit_udeg)?;
-    Ok(Calibration {
+    Ok(EncoderCalibration {
         encoder: fit,
         gear,
         step_loss_limit_udeg,

@@ -30,7 +30,7 @@ pub struct ErrorMapFit {
 
 /// Why there is no map.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
+pub enum MapFitError {
     /// Not enough readings to know a fit from a coincidence.
     #[error("{given} readings are too few for an error map: take at least {needed}")]
     TooFew {
@@ -52,13 +52,13 @@ pub enum FitError {
 ///
 /// # Errors
 /// Fewer than twice as many readings as unknowns, readings in one place, or errors above 0.5°.
-pub fn fit_error_map(readings: &[Reading], zero_deg: f64) -> Result<ErrorMapFit, FitError> {
+pub fn fit_error_map(readings: &[Reading], zero_deg: f64) -> Result<ErrorMapFit, MapFitError> {
     let places = || readings.iter().map(|r| r.encoder_deg);
     let arc_deg = places().fold(f64::MIN, f64::max) - places().fold(f64::MAX, f64::min);
     let harmonics = if arc_deg >= ARC_FOR_TWO_DEG { 2 } else { 1 };
     let unknowns = 1 + 2 * harmonics;
     if readings.len() < 2 * unknowns {
-        return Err(FitError::TooFew {
+        return Err(MapFitError::TooFew {
             given: readings.len(),
             needed: 2 * unknowns,
         });
@@ -83,13 +83,13 @@ pub fn fit_error_map(readings: &[Reading], zero_deg: f64) -> Result<ErrorMapFit,
     let (least, most) = (svd.singular_values.min(), svd.singular_values.max());
     // Within an eighth of a turn the constant and the cosine are the same to a thousandth.
     if least.is_nan() || least < 1e-3 * most {
-        return Err(FitError::TooClose);
+        return Err(MapFitError::TooClose);
     }
-    let solution = svd.solve(&errors, 0.0).map_err(|_| FitError::TooClose)?;
+    let solution = svd.solve(&errors, 0.0).map_err(|_| MapFitError::TooClose)?;
     let mut amplitudes_udeg = [0; 4];
     for (amplitude, deg) in amplitudes_udeg.iter_mut().zip(solution.iter().skip(1)) {
         if deg.is_nan() || deg.abs() > 0.5 {
-            return Err(FitError::TooLarge(*deg));
+            return Err(MapFitError::TooLarge(*deg));
         }
         *amplitude = (deg * 1e6).round() as i32;
     }
@@ -144,14 +144,14 @@ mod tests {
     fn too_few_too_close_and_too_large_are_refused() {
         let few = fit_error_map(&readings(5, 90.0, f64::sin), 0.0);
         let needed = 6;
-        assert_eq!(few, Err(FitError::TooFew { given: 5, needed }));
+        assert_eq!(few, Err(MapFitError::TooFew { given: 5, needed }));
         assert_eq!(
             fit_error_map(&readings(10, 1.0, |_| 0.0), 0.0),
-            Err(FitError::TooClose)
+            Err(MapFitError::TooClose)
         );
         assert!(matches!(
             fit_error_map(&readings(24, 360.0, |p| 3.0 * p.sin()), 0.0),
-            Err(FitError::TooLarge(_))
+            Err(MapFitError::TooLarge(_))
         ));
     }
 }

@@ -12,10 +12,10 @@ mod simulated_port;
 mod stream;
 mod transport;
 
-pub use calibrate::{CalibrateError, Calibration, calibrate_axis, is_uncalibrated};
+pub use calibrate::{CalibrateError, EncoderCalibration, calibrate_axis, is_uncalibrated};
 pub use controller::{HEARTBEAT_US, RemoteController, Ticket};
 pub use error::LinkError;
-pub use error_map::{ErrorMapFit, FitError, Reading, fit_error_map};
+pub use error_map::{ErrorMapFit, MapFitError, Reading, fit_error_map};
 pub use gear_map::{GearMapFit, GearReading, fit_gear_map};
 pub use stream::StreamTransport;
 pub use transport::Transport;

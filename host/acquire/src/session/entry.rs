@@ -30,7 +30,7 @@ pub enum Entry {
     /// Anything else that somebody should know in the morning.
     Event(String),
     /// The program ended cleanly: in which state, and why.
-    Stop(End, String),
+    Stop(SessionEnd, String),
 }
 
 /// A pose that is done.
@@ -52,7 +52,7 @@ pub struct PoseDone {
 
 /// How a program left a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum SessionEnd {
     /// Every pose is done, or given up.
     Finished,
     /// A person ordered it.
@@ -63,23 +63,23 @@ pub enum End {
     Failed,
 }
 
-impl End {
+impl SessionEnd {
     /// Its word in the journal and on the live page. [`End::AwaitsMaterial`] is a pause there.
     pub fn name(self) -> &'static str {
         match self {
-            End::Finished => "finished",
-            End::Paused | End::AwaitsMaterial => "paused",
-            End::Failed => "failed",
+            SessionEnd::Finished => "finished",
+            SessionEnd::Paused | SessionEnd::AwaitsMaterial => "paused",
+            SessionEnd::Failed => "failed",
         }
     }
 
     /// Of a line of the journal.
     fn of_line(word: &str, reason: &str) -> Option<Self> {
         Some(match word {
-            "finished" => End::Finished,
-            "paused" if reason == CHANGE_THE_SAMPLE => End::AwaitsMaterial,
-            "paused" => End::Paused,
-            "failed" => End::Failed,
+            "finished" => SessionEnd::Finished,
+            "paused" if reason == CHANGE_THE_SAMPLE => SessionEnd::AwaitsMaterial,
+            "paused" => SessionEnd::Paused,
+            "failed" => SessionEnd::Failed,
             _ => return None,
         })
     }
@@ -127,7 +127,7 @@ impl Entry {
             "event" => Entry::Event(rest.into()),
             "stop" => {
                 let (word, reason) = rest.split_once(' ')?;
-                Entry::Stop(End::of_line(word, reason)?, reason.into())
+                Entry::Stop(SessionEnd::of_line(word, reason)?, reason.into())
             }
             _ => return None,
         })
@@ -180,10 +180,10 @@ mod tests {
                 why: "the lamp is darker".into(),
             },
             Entry::Event("the disk is nearly full".into()),
-            Entry::Stop(End::Finished, "all poses done".into()),
-            Entry::Stop(End::Failed, "the camera is gone".into()),
-            Entry::Stop(End::Paused, "by Ctrl-C".into()),
-            Entry::Stop(End::AwaitsMaterial, CHANGE_THE_SAMPLE.into()),
+            Entry::Stop(SessionEnd::Finished, "all poses done".into()),
+            Entry::Stop(SessionEnd::Failed, "the camera is gone".into()),
+            Entry::Stop(SessionEnd::Paused, "by Ctrl-C".into()),
+            Entry::Stop(SessionEnd::AwaitsMaterial, CHANGE_THE_SAMPLE.into()),
         ] {
             assert_eq!(Entry::parse(&entry.to_string()), Some(entry));
         }

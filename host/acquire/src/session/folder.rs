@@ -1,8 +1,8 @@
 //! A session's folder as it is read.
 
-use crate::session::entry::{End, Entry, PoseDone};
+use crate::session::entry::{Entry, PoseDone, SessionEnd};
 use crate::session::journal::Lines;
-use crate::session::provenance::Provenance;
+use crate::session::provenance::SessionProvenance;
 use crate::session::{journal, record};
 use gonia_brdf::Pose;
 use gonia_formats::FileError;
@@ -42,7 +42,7 @@ pub struct SessionFolder {
     folder: PathBuf,
     rig: Rig,
     plan: Vec<Pose>,
-    provenance: Provenance,
+    provenance: SessionProvenance,
     pub(super) lines: Lines,
     done: BTreeMap<Key, PoseDone>,
 }
@@ -66,7 +66,7 @@ impl SessionFolder {
                 "give the folder of a capture",
             ));
         }
-        let provenance = Provenance::read(&folder.join(PROVENANCE))?;
+        let provenance = SessionProvenance::read(&folder.join(PROVENANCE))?;
         check_crc(&folder.join(RIG), &provenance.rig_crc)?;
         check_crc(&folder.join(PLAN), &provenance.plan_crc)?;
         let rig = read_rig(&folder.join(RIG))?;
@@ -109,7 +109,7 @@ impl SessionFolder {
     }
 
     /// What it is measured with.
-    pub fn provenance(&self) -> &Provenance {
+    pub fn provenance(&self) -> &SessionProvenance {
         &self.provenance
     }
 
@@ -144,7 +144,7 @@ impl SessionFolder {
     }
 
     /// How the last program left it; `None` when it was killed, or still runs.
-    pub fn end(&self) -> Option<(End, &str)> {
+    pub fn end(&self) -> Option<(SessionEnd, &str)> {
         match self.lines.entries.last() {
             Some(Entry::Stop(end, reason)) => Some((*end, reason)),
             _ => None,

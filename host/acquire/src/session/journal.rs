@@ -126,7 +126,7 @@ impl Journal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::entry::End;
+    use crate::session::entry::SessionEnd;
 
     fn written(n: usize) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
@@ -150,7 +150,7 @@ mod tests {
             assert_eq!(lines.whole_bytes + lines.torn_bytes, keep as u64);
             let mut journal = Journal::append_to(&path, Some(&lines)).unwrap();
             journal
-                .write(&Entry::Stop(End::Paused, "x".into()))
+                .write(&Entry::Stop(SessionEnd::Paused, "x".into()))
                 .unwrap();
             assert_eq!(read(&path).unwrap().entries.len(), whole + 1);
         }

@@ -21,8 +21,8 @@ mod samples;
 mod verify;
 mod writer;
 
-pub use entry::{CHANGE_THE_SAMPLE, End, Entry, PoseDone};
+pub use entry::{CHANGE_THE_SAMPLE, Entry, PoseDone, SessionEnd};
 pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
-pub use provenance::{ControllerIdentity, Provenance};
+pub use provenance::{ControllerIdentity, SessionProvenance};
 pub use verify::{Finding, Verdict, verify};
 pub use writer::{Beginning, Claim, SessionWriter};

@@ -8,7 +8,7 @@ use std::path::Path;
 /// What a session was measured with, from its beginning to its end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Provenance {
+pub struct SessionProvenance {
     /// The program that began it, with its version.
     pub program: String,
     /// When it began, UTC.
@@ -53,7 +53,7 @@ impl From<&Identity> for ControllerIdentity {
     }
 }
 
-impl Provenance {
+impl SessionProvenance {
     /// Reads it.
     ///
     /// # Errors

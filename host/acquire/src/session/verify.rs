@@ -1,6 +1,6 @@
 //! Whether a session is what it says.
 
-use crate::session::entry::{End, Entry};
+use crate::session::entry::{Entry, SessionEnd};
 use crate::session::folder::{FRAMES, JOURNAL, SessionFolder};
 use gonia_formats::FileError;
 use gonia_formats::frames_csv::read_frames_csv;
@@ -23,7 +23,7 @@ pub struct Verdict {
     /// The largest pointing error of a pose, degrees.
     pub max_pointing_deg: f64,
     /// How the last program left it.
-    pub end: Option<(End, String)>,
+    pub end: Option<(SessionEnd, String)>,
     /// What is broken, or worth knowing.
     pub findings: Vec<Finding>,
 }
@@ -94,7 +94,7 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
         .iter()
         .map(|r| session.missing(*r).len())
         .sum();
-    if let Some((End::Finished, _)) = session.end()
+    if let Some((SessionEnd::Finished, _)) = session.end()
         && missing > 0
         && !session
             .journal()
@@ -171,7 +171,7 @@ mod tests {
             writer.keep(&frame, 0.002).unwrap();
         }
         writer
-            .note(&Entry::Stop(End::Paused, "by hand".into()))
+            .note(&Entry::Stop(SessionEnd::Paused, "by hand".into()))
             .unwrap();
         drop(writer);
         let verdict = verify(folder.path()).unwrap();

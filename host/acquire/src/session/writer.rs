@@ -3,7 +3,7 @@
 use crate::session::entry::{Entry, PoseDone};
 use crate::session::folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder, crc_of};
 use crate::session::journal::Journal;
-use crate::session::provenance::Provenance;
+use crate::session::provenance::SessionProvenance;
 use crate::session::{clock, record};
 use gonia_brdf::Pose;
 use gonia_formats::plan_csv::write_plan_csv;
@@ -34,7 +34,7 @@ pub struct Beginning<'a> {
     /// The poses.
     pub plan: &'a [Pose],
     /// Checksums and time are put in when it begins.
-    pub provenance: &'a Provenance,
+    pub provenance: &'a SessionProvenance,
 }
 
 impl Claim {
@@ -63,7 +63,7 @@ impl Claim {
             write_whole_bytes(&folder.join(name), bytes)?;
         }
         write_plan_csv(&folder.join(PLAN), beginning.plan)?;
-        let provenance = Provenance {
+        let provenance = SessionProvenance {
             rig_crc: crc_of(&folder.join(RIG))?,
             plan_crc: crc_of(&folder.join(PLAN))?,
             began: clock::now(),
@@ -239,19 +239,19 @@ fn lock(folder: &Path) -> Result<Lock, FileError> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::session::entry::End;
+    use crate::session::entry::SessionEnd;
     use crate::session::provenance::ControllerIdentity;
     use crate::session::record::tests::some_frame;
     use gonia_brdf::Direction;
     use gonia_rig::{Rig, Role};
 
-    pub fn provenance() -> Provenance {
+    pub fn provenance() -> SessionProvenance {
         let arm = ControllerIdentity {
             board: "sim".into(),
             firmware: "0.1.0 (abc)".into(),
             config_crc: "00000001".into(),
         };
-        Provenance {
+        SessionProvenance {
             program: "gonia".into(),
             began: String::new(),
             rig_crc: String::new(),
@@ -342,7 +342,9 @@ pub(super) mod tests {
 
         let folder = tempfile::tempdir().unwrap();
         let mut writer = begin(folder.path());
-        writer.note(&Entry::Stop(End::Paused, "x".into())).unwrap();
+        writer
+            .note(&Entry::Stop(SessionEnd::Paused, "x".into()))
+            .unwrap();
         drop(writer);
         let path = folder.path().join(PLAN);
         let text = std::fs::read_to_string(&path).unwrap();

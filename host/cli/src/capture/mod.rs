@@ -10,7 +10,8 @@ use gonia_acquire::capture::{
     ArmPortNames, Ended, Equipment, Orders, UnattendedSession, Watch, Watchers, free_mb, travelling,
 };
 use gonia_acquire::session::{
-    Beginning, Claim, ControllerIdentity, End, Entry, Provenance, RIG, SessionFolder, SessionWriter,
+    Beginning, Claim, ControllerIdentity, Entry, RIG, SessionEnd, SessionFolder, SessionProvenance,
+    SessionWriter,
 };
 use gonia_brdf::Pose;
 use gonia_formats::frames_csv::write_frames_csv;
@@ -188,7 +189,7 @@ impl Capture {
         let session = SessionFolder::open(&self.folder)?;
         list_frames(&session)?;
         table::print(&describe(&session, ended));
-        if ended.end != End::Finished {
+        if ended.end != SessionEnd::Finished {
             let (done, planned) = (
                 session.done().count(),
                 session.roles().len() * session.plan().len(),
@@ -213,8 +214,8 @@ impl Capture {
 }
 
 /// What the session is measured with. Checksums of its files and its time are put in when it begins.
-fn provenance_of(equipment: &mut Equipment, reference: bool) -> Provenance {
-    Provenance {
+fn provenance_of(equipment: &mut Equipment, reference: bool) -> SessionProvenance {
+    SessionProvenance {
         program: gonia_pipeline::provenance::program(),
         began: String::new(),
         rig_crc: String::new(),
@@ -257,7 +258,7 @@ fn check_same(kept: &Path, text: &[u8], given: &Path) -> Result<()> {
 }
 
 /// A session goes on with what it began with.
-fn check_equipment(began: &Provenance, now: &Provenance) -> Result<()> {
+fn check_equipment(began: &SessionProvenance, now: &SessionProvenance) -> Result<()> {
     for (name, began, now) in [
         ("light arm", &began.light_arm, &now.light_arm),
         ("camera arm", &began.camera_arm, &now.camera_arm),

@@ -149,7 +149,7 @@ impl Split {
 }
 
 /// Some of the frames, or of each only its centre.
-pub struct Subset<'a> {
+pub struct FrameSubset<'a> {
     samples: &'a [Sample],
     name: String,
     frames: Vec<u32>,
@@ -157,17 +157,17 @@ pub struct Subset<'a> {
     centres: Option<Vec<Sample>>,
 }
 
-impl<'a> Subset<'a> {
+impl<'a> FrameSubset<'a> {
     /// All frames, then fewer and fewer of them (in an order without pattern, each subset a part of
     /// the one before), then one central sample of each frame whose light is not oblique.
-    pub fn all_of(samples: &'a [Sample]) -> Vec<Subset<'a>> {
+    pub fn all_of(samples: &'a [Sample]) -> Vec<FrameSubset<'a>> {
         let frames = frames_of(samples);
         let mut order: Vec<u32> = frames.iter().map(|frame| frame.number).collect();
         order.sort_by_key(|number| hash(*number));
         let total = order.len();
         let sizes = std::iter::once(total).chain(SUBSETS.into_iter().filter(|size| *size < total));
-        let mut subsets: Vec<Subset> = sizes
-            .map(|size| Subset {
+        let mut subsets: Vec<FrameSubset> = sizes
+            .map(|size| FrameSubset {
                 samples,
                 name: format!("{size} images"),
                 frames: order[..size].to_vec(),
@@ -175,7 +175,7 @@ impl<'a> Subset<'a> {
             })
             .collect();
         let centres = centres_of(samples, &frames);
-        subsets.push(Subset {
+        subsets.push(FrameSubset {
             samples,
             name: format!("{} images, central samples only", centres.len()),
             frames: centres.iter().map(|sample| sample.frame).collect(),
@@ -287,8 +287,8 @@ pub(super) mod tests {
     #[test]
     fn subsets_shrink_inside_each_other_and_end_with_the_central_samples() {
         let samples = samples(1);
-        let subsets = Subset::all_of(&samples);
-        let sizes: Vec<usize> = subsets.iter().map(Subset::frames).collect();
+        let subsets = FrameSubset::all_of(&samples);
+        let sizes: Vec<usize> = subsets.iter().map(FrameSubset::frames).collect();
         assert_eq!(sizes, [8505, 4000, 2000, 1000, 500, 250, 6561]);
         assert!(
             subsets[2]

@@ -10,7 +10,7 @@ mod method;
 mod table;
 mod test_set;
 
-pub use frames::{ChartError, Split, Subset, poses_of};
+pub use frames::{ChartError, FrameSubset, Split, poses_of};
 pub use method::{Family, Method, standard};
 pub use table::{front, to_csv};
 pub use test_set::{TestCounts, TestSet};
@@ -21,7 +21,7 @@ use gonia_rig::StratumFigures;
 
 /// A method's place on the chart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct ChartPoint {
     /// What was measured: the method's name, and the samples it had where they are not all.
     pub name: String,
     /// What kind of method it is.
@@ -54,7 +54,7 @@ pub fn methods(
     compared: &[Method],
     tests: &TestSet,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Vec<Point>, Error> {
+) -> Result<Vec<ChartPoint>, Error> {
     let mut points = Vec::with_capacity(compared.len());
     for (k, method) in compared.iter().enumerate() {
         points.push(measure(bins, frames, method, tests)?);
@@ -68,11 +68,11 @@ pub fn methods(
 /// # Errors
 /// Too few bins.
 pub fn images(
-    subsets: &[Subset<'_>],
+    subsets: &[FrameSubset<'_>],
     compared: &[Method],
     tests: &TestSet,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Vec<Point>, Error> {
+) -> Result<Vec<ChartPoint>, Error> {
     let mut points = Vec::new();
     for (k, subset) in subsets.iter().enumerate() {
         let bins = Bins::new(tests.grid(), &subset.samples());
@@ -86,10 +86,15 @@ pub fn images(
     Ok(points)
 }
 
-fn measure(bins: &Bins, frames: usize, method: &Method, tests: &TestSet) -> Result<Point, Error> {
+fn measure(
+    bins: &Bins,
+    frames: usize,
+    method: &Method,
+    tests: &TestSet,
+) -> Result<ChartPoint, Error> {
     let run = method.run(bins, tests.cells())?;
     let (strata, sphere_delta_e) = tests.figures(&run.values);
-    Ok(Point {
+    Ok(ChartPoint {
         name: method.to_string(),
         family: method.family(),
         is_default: method.is_default(bins.grid()),

@@ -1,12 +1,12 @@
 //! The chart as numbers.
 
-use crate::chart::Point;
+use crate::chart::ChartPoint;
 use gonia_rig::Stratum;
 use std::fmt::Write as _;
 
 /// The points that no other one beats in both cost and error, cheapest first, as indices. Points
 /// without a finite error are on no front.
-pub fn front(points: &[Point], error: impl Fn(&Point) -> Option<f64>) -> Vec<usize> {
+pub fn front(points: &[ChartPoint], error: impl Fn(&ChartPoint) -> Option<f64>) -> Vec<usize> {
     let mut ranked: Vec<(f64, f64, usize)> = points
         .iter()
         .enumerate()
@@ -25,13 +25,13 @@ pub fn front(points: &[Point], error: impl Fn(&Point) -> Option<f64>) -> Vec<usi
 
 /// One row a method and stratum. `front` is 1 where no other method beats it in both core-seconds
 /// and this stratum's log-RMS.
-pub fn to_csv(points: &[Point]) -> String {
+pub fn to_csv(points: &[ChartPoint]) -> String {
     let mut text = String::from(
         "method,family,default,front,frames,core_s,share_measured,failed,stratum,tests,log_rms,log_mean,cos_error_mean,cos_error_p99,delta_e,sphere_delta_e\n",
     );
     let optional = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.4}"));
     for stratum in Stratum::ALL {
-        let of = |point: &Point| {
+        let of = |point: &ChartPoint| {
             let rows = &point.strata;
             rows.iter().find(|row| row.stratum == stratum).copied()
         };
@@ -67,8 +67,8 @@ mod tests {
     use super::*;
     use crate::chart::Family;
 
-    fn point(core_s: f64, error: f64) -> Point {
-        Point {
+    fn point(core_s: f64, error: f64) -> ChartPoint {
+        ChartPoint {
             name: "a,b".into(),
             family: Family::Rbf,
             is_default: false,

@@ -33,7 +33,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What [`process`] is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum FrameStage {
     /// Frames of the reference.
     Reference,
     /// Frames of the material.
@@ -150,7 +150,7 @@ pub fn process(
 }
 
 /// Hears the stage and the frames done in it.
-pub type Heard<'a> = &'a (dyn Fn(Stage, usize) -> ControlFlow<()> + Sync);
+pub type Heard<'a> = &'a (dyn Fn(FrameStage, usize) -> ControlFlow<()> + Sync);
 
 /// How a frame is had sampled, from any thread.
 pub type Sampled<'a> = &'a (dyn Fn(&FrameRow, Hidden) -> Result<SampledFrame, ProcessError> + Sync);
@@ -180,7 +180,7 @@ pub fn process_sampled(
     let mut frames = Vec::with_capacity(rows.len());
     let mut references = Vec::new();
     bench.each(
-        Stage::Reference,
+        FrameStage::Reference,
         &reference,
         progress,
         |row| bench.reference(row),
@@ -202,7 +202,7 @@ pub fn process_sampled(
     let mut samples = Vec::with_capacity(material.len() * bench.grid.points_mm().len());
     let mut left_out = LeftOutCounts::default();
     bench.each(
-        Stage::Material,
+        FrameStage::Material,
         &material,
         progress,
         |row| bench.material(row, &calibrator),
@@ -255,7 +255,7 @@ impl Bench<'_> {
     /// Does `work` on rows in parallel, and `gather`s what it gives in their order.
     fn each<T: Send>(
         &self,
-        stage: Stage,
+        stage: FrameStage,
         rows: &[&FrameRow],
         progress: Heard<'_>,
         work: impl Fn(&FrameRow) -> Result<T, ProcessError> + Sync,

@@ -12,7 +12,7 @@ use crate::capture::frame_worker::lock;
 use crate::capture::orders::Orders;
 use crate::capture::shooter::{SessionSummary, Shooter};
 use crate::capture::watch::{SessionEvent, Watch};
-use crate::session::{CHANGE_THE_SAMPLE, End, Entry, SessionFolder, SessionWriter};
+use crate::session::{CHANGE_THE_SAMPLE, Entry, SessionEnd, SessionFolder, SessionWriter};
 use gonia_formats::FileError;
 use gonia_pipeline::process::{Outcome, SampledFrame};
 use gonia_rig::{Rig, Role, SessionSettings};
@@ -43,7 +43,7 @@ pub struct UnattendedSession<'a> {
 #[derive(Clone, Debug)]
 pub struct Ended {
     /// In which state.
-    pub end: End,
+    pub end: SessionEnd,
     /// Why.
     pub reason: String,
     /// What the arms did.
@@ -112,7 +112,7 @@ impl UnattendedSession<'_> {
         if matches!(result, Err(Halt::Stopped(_))) {
             // They have been stopped already; this is for a stop that did not arrive.
             let _ = shooter.arms().stop();
-        } else if matches!(end, End::Finished | End::Failed)
+        } else if matches!(end, SessionEnd::Finished | SessionEnd::Failed)
             && let Some(first) = session.plan().first()
         {
             // A fault that ended the session may forbid it; then they stay where they are.
@@ -143,23 +143,23 @@ impl UnattendedSession<'_> {
 }
 
 /// The state in which a session ends, and the reason, for people.
-fn how_it_ended(result: &Result<(), Halt>, given_up: usize) -> (End, String) {
+fn how_it_ended(result: &Result<(), Halt>, given_up: usize) -> (SessionEnd, String) {
     match result {
         Ok(()) if given_up > 0 => (
-            End::Failed,
+            SessionEnd::Failed,
             format!("{given_up} poses could not be reached"),
         ),
-        Ok(()) => (End::Finished, "every pose is done".to_owned()),
-        Err(Halt::Paused(why) | Halt::Stopped(why)) => (End::Paused, why.clone()),
-        Err(Halt::AwaitsMaterial) => (End::AwaitsMaterial, CHANGE_THE_SAMPLE.to_owned()),
-        Err(Halt::Failed(why)) => (End::Failed, why.clone()),
+        Ok(()) => (SessionEnd::Finished, "every pose is done".to_owned()),
+        Err(Halt::Paused(why) | Halt::Stopped(why)) => (SessionEnd::Paused, why.clone()),
+        Err(Halt::AwaitsMaterial) => (SessionEnd::AwaitsMaterial, CHANGE_THE_SAMPLE.to_owned()),
+        Err(Halt::Failed(why)) => (SessionEnd::Failed, why.clone()),
     }
 }
 
 /// Whether a session ended once so that a person would change the sample. One that was killed between
 /// reference and material did not.
 fn has_awaited_material(session: &SessionFolder) -> bool {
-    let awaits = |entry: &Entry| matches!(entry, Entry::Stop(End::AwaitsMaterial, _));
+    let awaits = |entry: &Entry| matches!(entry, Entry::Stop(SessionEnd::AwaitsMaterial, _));
     session.journal().iter().any(awaits)
 }
 
