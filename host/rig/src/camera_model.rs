@@ -1,6 +1,6 @@
 //! The rig's camera: what a pose lets one expect in the image.
 
-use crate::{CameraSetup, Homography};
+use crate::{CameraGeometry, Homography};
 use gonia_brdf::Direction;
 use nalgebra::{Matrix3, Rotation2};
 
@@ -35,7 +35,7 @@ pub struct CameraShift {
 
 impl CameraModel {
     /// The camera of a rig.
-    pub fn new(camera: &CameraSetup) -> Self {
+    pub fn new(camera: &CameraGeometry) -> Self {
         Self {
             distance_mm: camera.distance_m * 1000.0,
             focal_px: camera.focal_px,

@@ -2,7 +2,7 @@
 
 use crate::bench_setup::check_bench;
 use crate::rig_error::within;
-use crate::{CameraSetup, LightSetup, Reference, Rig, RigError, Sampling, Sensor, Target};
+use crate::{CameraGeometry, LightGeometry, Reference, Rig, RigError, Sampling, Sensor, Target};
 
 /// Checks that a rig could exist, whoever made it.
 ///
@@ -29,7 +29,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     )
 }
 
-fn check_camera(camera: &CameraSetup) -> Result<(), RigError> {
+fn check_camera(camera: &CameraGeometry) -> Result<(), RigError> {
     within("camera.distance_m", camera.distance_m, 0.01..=1000.0, "m")?;
     let sides = 16.0..=65_536.0;
     within(
@@ -91,8 +91,8 @@ fn check_target(target: &Target) -> Result<(), RigError> {
 fn check_sampling(
     sampling: &Sampling,
     target: &Target,
-    light: &LightSetup,
-    camera: &CameraSetup,
+    light: &LightGeometry,
+    camera: &CameraGeometry,
 ) -> Result<(), RigError> {
     within(
         "sampling.disc_radius_mm",

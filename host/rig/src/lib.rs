@@ -39,7 +39,7 @@ pub use frame_row::{Exposure, FrameRow, Role};
 pub use genicam::{ExposureTiming, Genicam, PixelFormat};
 pub use homography::Homography;
 pub use raw_frame::RawFrame;
-pub use rig::{CameraSetup, LightSetup, Reference, ReflectanceTable, Rig, Sampling, Target};
+pub use rig::{CameraGeometry, LightGeometry, Reference, ReflectanceTable, Rig, Sampling, Target};
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;
 pub use scale::Scale;

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Rig {
     /// The light.
-    pub light: LightSetup,
+    pub light: LightGeometry,
     /// The camera.
-    pub camera: CameraSetup,
+    pub camera: CameraGeometry,
     /// The target's fiducial lines and the sample's size.
     pub target: Target,
     /// The reference's reflectance, where it is known.
@@ -37,7 +37,7 @@ pub struct Rig {
 /// A point source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LightSetup {
+pub struct LightGeometry {
     /// Distance from the sample's centre, metres.
     pub distance_m: f64,
 }
@@ -45,7 +45,7 @@ pub struct LightSetup {
 /// A pinhole camera with optional radial distortion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CameraSetup {
+pub struct CameraGeometry {
     /// Distance from the sample's centre, metres.
     pub distance_m: f64,
     /// Width of a frame, pixels.
@@ -156,8 +156,8 @@ impl Rig {
     /// polar angle up to 75°.
     pub fn paper(px: usize) -> Self {
         Self {
-            light: LightSetup { distance_m: 1.1 },
-            camera: CameraSetup {
+            light: LightGeometry { distance_m: 1.1 },
+            camera: CameraGeometry {
                 distance_m: 1.8,
                 width_px: px,
                 height_px: px,

@@ -1,7 +1,7 @@
 //! Lines in photographs by a real camera: its noise, its compression, its lens.
 
 use super::*;
-use gonia_rig::CameraSetup;
+use gonia_rig::CameraGeometry;
 
 /// The edges of five squares by five, as if the target's lines ran along them.
 const TARGET: Target = Target {
@@ -78,7 +78,7 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
     for (number, photograph) in PHOTOGRAPHS.iter().enumerate() {
         let frame = edges(photograph.png);
         let rig = Rig {
-            camera: CameraSetup {
+            camera: CameraGeometry {
                 distance_m: 1.8,
                 width_px: frame.width,
                 height_px: frame.height,
