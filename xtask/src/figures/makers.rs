@@ -83,10 +83,10 @@ pub const FIGURES: &[Figure] = &[
         run("cargo bench -p gonia-brdf --bench fill -- tenth --step 4 matte fabric ggx sharp round brushed-metal ward sharper satin default"),
     ]),
     figure("coordinates", 6.0, Tables, &[
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --power 0.1 --kernel 0.3"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --power 0.25 --kernel 0.3"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --power 0.5 --kernel 0.3"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --power 0.25 --kernel 1"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --exponent 0.1 --kernel 0.3"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --exponent 0.25 --kernel 0.3"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --exponent 0.5 --kernel 0.3"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp sharper ggx --exponent 0.25 --kernel 1"),
     ]),
     figure("methods", 5.0, Text, &[
         GONIA,
@@ -95,17 +95,17 @@ pub const FIGURES: &[Figure] = &[
     ])
     .with(&[("chart/methods.svg", "methods.svg")]),
     figure("methods-sharp", 5.0, Text, &[
-        prepare("data/sharp-truth.exr", "cargo run --release -p gonia --example analytic -- sharp {work}/data"),
+        prepare("data/sharp-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- sharp {work}/data"),
         GONIA,
         run("gonia chart {work}/data/sharp.npy --truth {work}/data/sharp-truth.exr --only methods --tests 1500 --out {work}/chart-sharp"),
     ]),
     figure("methods-satin", 5.0, Text, &[
-        prepare("data/satin-truth.exr", "cargo run --release -p gonia --example analytic -- satin {work}/data"),
+        prepare("data/satin-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- satin {work}/data"),
         GONIA,
         run("gonia chart {work}/data/satin.npy --truth {work}/data/satin-truth.exr --only methods --tests 1500 --out {work}/chart-satin"),
     ]),
     figure("methods-matte", 5.0, Text, &[
-        prepare("data/matte-truth.exr", "cargo run --release -p gonia --example analytic -- matte {work}/data"),
+        prepare("data/matte-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- matte {work}/data"),
         GONIA,
         run("gonia chart {work}/data/matte.npy --truth {work}/data/matte-truth.exr --only methods --tests 1500 --out {work}/chart-matte"),
     ]),
@@ -118,10 +118,10 @@ pub const FIGURES: &[Figure] = &[
     figure("scipy", 6.0, Tables, &[
         prepare("python/pyvenv.cfg", "python3 -m venv {work}/python"),
         run("{work}/python/bin/pip install --quiet -r bench/baselines/requirements.txt"),
-        prepare("data/sharp-truth.exr", "cargo run --release -p gonia --example analytic -- sharp {work}/data"),
-        prepare("data/fabric-truth.exr", "cargo run --release -p gonia --example analytic -- fabric {work}/data"),
-        prepare("data/matte-truth.exr", "cargo run --release -p gonia --example analytic -- matte {work}/data"),
-        prepare("data/satin-truth.exr", "cargo run --release -p gonia --example analytic -- satin {work}/data"),
+        prepare("data/sharp-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- sharp {work}/data"),
+        prepare("data/fabric-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- fabric {work}/data"),
+        prepare("data/matte-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- matte {work}/data"),
+        prepare("data/satin-truth.exr", "cargo run --release -p gonia-pipeline --example analytic -- satin {work}/data"),
         GONIA,
         run("gonia fill {work}/data/sharp.npy -o {work}/data/sharp.exr --scale absolute"),
         run("gonia fill {work}/data/fabric.npy -o {work}/data/fabric.exr --scale absolute"),
@@ -161,7 +161,7 @@ pub const FIGURES: &[Figure] = &[
     .with(&[("accuracy_cost.svg", "accuracy_cost.svg")]),
     figure("hough", 1.0, Tables, &[run("cargo bench -p gonia --bench accuracy -- hough")]),
     figure("photograph", 0.1, Text, &[run(
-        "cargo test --release -p gonia --lib -- --nocapture lines_in_a_photograph",
+        "cargo test --release -p gonia-imaging --lib -- --nocapture lines_in_a_photograph",
     )]),
     figure(
         "stability",
