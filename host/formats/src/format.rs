@@ -37,7 +37,7 @@ pub(crate) struct DenseFormat {
     /// Reads a file whole.
     pub read: fn(&Path) -> Result<DenseFile, FileError>,
     /// Opens a file of which a few cells are wanted; `None` for a file that must be read whole.
-    pub open: fn(&Path) -> Result<Option<Box<dyn CellReader>>, FileError>,
+    pub open: OpenCells,
     /// Absent where the format is only read.
     pub write: Option<DenseWriter>,
 }
@@ -51,6 +51,9 @@ pub(crate) struct DenseWriter {
     /// The standard errors that belong to it.
     pub error_bars: WriteErrorBars,
 }
+
+/// Opens a file for [`CellReader`], where it can be.
+pub(crate) type OpenCells = fn(&Path) -> Result<Option<Box<dyn CellReader>>, FileError>;
 
 /// See [`crate::dense::write_dense_by_rows`].
 pub(crate) type WriteRows = fn(
