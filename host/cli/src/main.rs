@@ -85,7 +85,7 @@ fn main() -> ExitCode {
     match start(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("gonia: {}", one_line(&error));
+            eprintln!("gonia: {}", chain_in_one_line(&error));
             ExitCode::FAILURE
         }
     }
@@ -120,15 +120,10 @@ fn start(cli: Cli) -> anyhow::Result<()> {
 }
 
 /// The whole chain of causes on one line; a cause that is in the text already is not said again.
-fn one_line(error: &anyhow::Error) -> String {
+fn chain_in_one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
-        let text: Vec<String> = cause
-            .to_string()
-            .split_whitespace()
-            .map(str::to_owned)
-            .collect();
-        let text = text.join(" ");
+        let text = gonia_formats::one_line(&cause.to_string());
         if !line.contains(&text) {
             if !line.is_empty() {
                 line += ": ";
@@ -148,7 +143,10 @@ mod tests {
     fn an_error_says_nothing_twice() {
         let inner = anyhow::anyhow!("a.exr: cannot be\nread");
         let error = inner.context("frame 3: a.exr: cannot be read").context("b");
-        assert_eq!(one_line(&error), "b: frame 3: a.exr: cannot be read");
+        assert_eq!(
+            chain_in_one_line(&error),
+            "b: frame 3: a.exr: cannot be read"
+        );
     }
 
     #[test]

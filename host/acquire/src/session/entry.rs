@@ -1,5 +1,6 @@
 //! What a line of the journal says.
 
+use gonia_formats::one_line;
 use gonia_rig::Role;
 use std::fmt;
 
@@ -149,11 +150,6 @@ fn parse_pose(text: &str) -> Option<PoseDone> {
         crc: u32::from_str_radix(crc.strip_prefix("crc=")?, 16).ok()?,
         pointing_deg: pointing.strip_prefix("pointing=")?.parse().ok()?,
     })
-}
-
-/// A line of the journal is one line whatever an error says.
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
