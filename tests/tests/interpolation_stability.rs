@@ -132,7 +132,7 @@ fn rows() -> Vec<Row> {
             0.3,
         ),
         row(
-            "both elevations ≥ 78°, beyond all samples",
+            "both polar angles ≥ 78°, beyond all samples",
             cloth(),
             |truth| {
                 let samples = plan(truth).into_iter();

@@ -1,4 +1,4 @@
-//! The baselines against scipy's `RBFInterpolator`: the numbers are printed by `bench/peers/scipy_reference.py`,
+//! The baselines against scipy's `RBFInterpolator`: the numbers are printed by `bench/baselines/scipy_reference.py`,
 //! which makes the same bins.
 
 #![allow(clippy::unwrap_used)]

@@ -36,11 +36,11 @@ pub struct Fill {
     /// Size of the blocks that share a factorisation, degrees [default: the preset's]
     #[arg(long, value_name = "DEG")]
     block: Option<f64>,
-    /// Neighbours a block [default: the preset's]
+    /// Data in the neighbourhood of a block [default: the preset's]
     #[arg(long, value_name = "N")]
     nodes: Option<usize>,
     /// Refine a block where finer ones differ from it by more than this many times the samples'
-    /// noise; 0 cuts all, inf none [default: the preset's, or more where cutting would cost too much]
+    /// noise; 0 refines all, inf none [default: the preset's, or more where refining would cost too much]
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,
     /// default, or a method that works cell by cell: paper, nearest, shepard, mls1, mls2,
@@ -57,7 +57,7 @@ pub struct Fill {
 enum PresetArgument {
     /// A first look, a few seconds
     Preview,
-    /// Half the work of the default
+    /// Two thirds of the work of the default
     Fast,
     /// Accurate to the noise on most materials
     Default,

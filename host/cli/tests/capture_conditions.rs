@@ -8,7 +8,7 @@ use gonia_acquire::camera::{Camera, CameraError, CommandCamera, Pulse, Rendering
 use gonia_acquire::capture::{
     Arms, Ended, Orders, SessionEvent, UnattendedSession, Watch, free_mb,
 };
-use gonia_acquire::session::{End, SessionFolder, SessionWriter, verify};
+use gonia_acquire::session::{SessionEnd, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
 use gonia_rig::{Frame, FrameRow, Rig, Thermometer};
 use gonia_sim::arm::SimulatedArm;
@@ -210,7 +210,7 @@ fn missing_and_extra_frames_are_noticed_and_their_poses_taken_again() {
     );
     assert_eq!(
         (ended.end, ended.retaken),
-        (End::Finished, 2),
+        (SessionEnd::Finished, 2),
         "{}",
         ended.reason
     );
@@ -230,7 +230,7 @@ fn poses_measured_under_a_darker_lamp_are_measured_again_when_it_is_back() {
         |call, first_pose| (call > 3 && first_pose < 3).then_some(Act::Dark),
         FaultPlan::default(),
     );
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
     assert_eq!(crcs(folder.path()), crcs(calm.path()));
     let text = journal(folder.path());
     assert!(
@@ -257,7 +257,7 @@ fn a_lamp_that_stays_dark_a_moved_sample_and_a_dead_camera_end_the_session_with_
         ),
     ] {
         let (folder, ended) = under(trouble, FaultPlan::default());
-        assert_eq!(ended.end, End::Failed, "{said}: {}", ended.reason);
+        assert_eq!(ended.end, SessionEnd::Failed, "{said}: {}", ended.reason);
         assert!(ended.reason.contains(said), "{}", ended.reason);
         let text = journal(folder.path());
         assert!(
@@ -299,7 +299,7 @@ fn a_fault_and_a_cable_that_was_out_are_recovered_automatically() {
         ..FaultPlan::default()
     };
     let (folder, ended) = under(quiet, plan);
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
     assert!(ended.arms.recoveries > 0);
     assert_eq!(crcs(folder.path()), crcs(calm.path()));
 }
@@ -319,7 +319,7 @@ fn a_full_disk_ends_the_session_before_anything_is_written() {
         &orders,
         true,
     );
-    assert_eq!(ended.end, End::Failed);
+    assert_eq!(ended.end, SessionEnd::Failed);
     assert!(ended.reason.contains("MB are reserved"), "{}", ended.reason);
     assert_eq!(crcs(folder.path()), []);
 }
@@ -337,7 +337,7 @@ fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
         &orders,
         false,
     );
-    assert_eq!(first.end, End::AwaitsMaterial);
+    assert_eq!(first.end, SessionEnd::AwaitsMaterial);
     assert!(first.reason.contains("put the material on the target"));
     assert_eq!(verify(folder.path()).unwrap().done, POSES);
     let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
@@ -349,7 +349,7 @@ fn on_a_bench_a_person_changes_the_sample_between_reference_and_material() {
         &orders,
         false,
     );
-    assert_eq!(second.end, End::Finished, "{}", second.reason);
+    assert_eq!(second.end, SessionEnd::Finished, "{}", second.reason);
     assert_eq!(verify(folder.path()).unwrap().done, 2 * POSES);
 }
 
@@ -369,7 +369,7 @@ fn orders_end_a_session_and_it_goes_on_from_there() {
     );
     assert_eq!(
         (ended.end, ended.reason.as_str()),
-        (End::Paused, "by Ctrl-C")
+        (SessionEnd::Paused, "by Ctrl-C")
     );
     let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
     let orders = Orders::default();
@@ -381,7 +381,7 @@ fn orders_end_a_session_and_it_goes_on_from_there() {
         &orders,
         true,
     );
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
 }
 
 fn calm_camera(rig: &Rig, sim: SimRig) -> Box<dyn Camera> {
@@ -409,7 +409,7 @@ fn a_session_goes_on_by_itself_when_a_full_disk_has_room_again() {
     };
     let none = FaultPlan::default();
     let ended = run_with(folder.path(), writer, none, &surroundings, calm_camera);
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
     assert_eq!(crcs(folder.path()), crcs(calm.path()));
     let text = journal(folder.path());
     assert_eq!(
@@ -445,7 +445,10 @@ impl Watch for Airing<'_> {
 #[test]
 #[cfg(unix)]
 fn a_session_waits_while_it_is_too_warm_and_looks_at_the_control_pose_after_it() {
-    for (degrees, end, looks) in [("22", End::Finished, 1), ("31.4", End::Failed, 3)] {
+    for (degrees, end, looks) in [
+        ("22", SessionEnd::Finished, 1),
+        ("31.4", SessionEnd::Failed, 3),
+    ] {
         let folder = tempfile::tempdir().unwrap();
         let place = tempfile::tempdir().unwrap();
         let reading = place.path().join("degrees");
@@ -479,7 +482,7 @@ fn a_session_waits_while_it_is_too_warm_and_looks_at_the_control_pose_after_it()
             "{heard:?}"
         );
         let text = journal(folder.path());
-        if end == End::Finished {
+        if end == SessionEnd::Finished {
             // Once after the warmth, once at the end.
             assert_eq!(text.matches(" control ").count(), 2, "{text}");
             assert_eq!(crcs(folder.path()).len(), POSES);
@@ -527,7 +530,7 @@ fn a_whole_session_whose_frames_a_program_takes() {
             changes: true,
         })
     });
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
 
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Some(begin(folder.path(), &small_rig(), POSES));
@@ -547,7 +550,7 @@ fn a_whole_session_whose_frames_a_program_takes() {
         "{file}",
     ];
     let mut retaken = 0;
-    for end in [End::Paused, End::Finished] {
+    for end in [SessionEnd::AwaitsMaterial, SessionEnd::Finished] {
         let writer = match writer.take() {
             Some(writer) => writer,
             // The material lies there now.

@@ -258,7 +258,7 @@ fn baselines_are_made_compared_and_shown_in_the_report() {
     write(&path("dense.exr"), 5.0, &model, Scale::Relative);
     write(&path("truth.exr"), 5.0, &model, Scale::Absolute);
     for (step, word) in [
-        ("12", "a multiple of dense.exr's 5 degrees"),
+        ("12", "a multiple of the measurement's 5 degrees"),
         ("30", "at most 20"),
     ] {
         let said = refused(&["rivals", text(dir.path()), "--step", step]);

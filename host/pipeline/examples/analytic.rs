@@ -1,5 +1,5 @@
 //! Samples of an analytic material as the paper's plan sees it, and the truth, as files for
-//! `gonia fill`, `gonia chart` and bench/peers.
+//! `gonia fill`, `gonia chart` and bench/baselines.
 //!
 //! `cargo run --release -p gonia-pipeline --example analytic -- MATERIAL DIR` (matte, broad, fabric, sharp,
 //! sharper) writes `DIR/MATERIAL.npy` and `DIR/MATERIAL-truth.exr`.

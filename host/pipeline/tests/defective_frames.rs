@@ -1,8 +1,8 @@
 //! The table of what registration and sampling make of frames that are not as they should be. Each
 //! case is put before the real chain at eight views, and the rows are docs/src/explanation/frames.md.
 //!
-//! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-pipeline --test defective_frames` writes the file; without it the
-//! test fails when the file says something else.
+//! `GONIA_UPDATE_DOCS=1 cargo test -p gonia-pipeline --test defective_frames` writes the rows; without it the
+//! test fails when the page says something else.
 #![allow(clippy::unwrap_used)]
 
 use gonia_brdf::direction::{angle_between, local_direction};
@@ -516,40 +516,31 @@ fn document() -> (String, Vec<String>) {
 }
 
 const HEAD: &str = "\
-# Frames that are not as they should be
-
-Written by `host/tests/vision_stability.rs`, which puts each case before registration and sampling at
-eight views (θv 0° to 75° where the row says no other; frames of 512 px, noise of 1 %, the arm's
-reading off by 0.02° in θ and φ), and fails when a row is not what happens, or when a lock is wrong:
-no corner of a locked target may be off by more than 0.3 px.
-
-*Locked*: the marks carry the frame; with the largest error of a sample's direction (to the light or
-to the camera, the worse) and of a corner. *By its pose*: some lines are hidden, what is seen agrees
-with the pose, and the arm's reading is used, with its error. *Value*: |ln(value / what there was to
-see there)| of all samples, median and 95th percentile; at θv = 75° a patch has some 12 pixels here.
-
-At grazing views the frame's own resolution is the limit: at θv = 86° a pixel is 32 mm of the target.
-A light that falls along a whole line moves it, and a tenth of a pixel of that cannot be told from the
-camera's own sag.
-
-One row is not as one would wish: four equal lines make a square, and a square turned by 90° is the
-same square. No frame can tell; the samples' azimuths are then off by 90°. Mark the sample itself.
-
 | case | locked | by its pose | refused | value | points left out |
 |---|---|---|---|---|---|
 ";
 
+/// The page with these rows between its two marks.
+fn with_rows(page: &str, rows: &str) -> String {
+    let (open, close) = ("<!-- rows -->\n", "<!-- /rows -->");
+    let (before, rest) = page.split_once(open).unwrap();
+    let (_, after) = rest.split_once(close).unwrap();
+    format!("{before}{open}{rows}{close}{after}")
+}
+
 #[test]
 fn no_frame_is_locked_wrongly_and_the_table_says_what_becomes_of_it() {
-    let (text, wrong) = document();
+    let (rows, wrong) = document();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/explanation/frames.md");
-    assert!(wrong.is_empty(), "{wrong:#?}\n{text}");
+    assert!(wrong.is_empty(), "{wrong:#?}\n{rows}");
+    let written = std::fs::read_to_string(&path).unwrap();
+    let page = with_rows(&written, &rows);
     if std::env::var_os("GONIA_UPDATE_DOCS").is_some() {
-        std::fs::write(&path, &text).unwrap();
+        std::fs::write(&path, &page).unwrap();
+        return;
     }
-    let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
-        written == text,
+        written == page,
         "docs/src/explanation/frames.md is out of date: run this test with GONIA_UPDATE_DOCS=1"
     );
 }

@@ -173,7 +173,7 @@ pub const FIGURES: &[Figure] = &[
         "defective-frames",
         0.5,
         Written,
-        &[run("GONIA_UPDATE_DOCS=1 cargo test --release -p gonia --test vision_stability")],
+        &[run("GONIA_UPDATE_DOCS=1 cargo test --release -p gonia-pipeline --test defective_frames")],
     ),
     figure(
         "faults",

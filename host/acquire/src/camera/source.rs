@@ -138,12 +138,12 @@ pub enum CameraError {
     NoTrigger,
     /// GenICam was left out of this program.
     #[error(
-        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/cameras.md)"
+        "this gonia was built without GenICam: install libaravis-dev, and build it with --features genicam (docs/src/guides/camera.md)"
     )]
     NoGenicam,
     /// The rig lacks what a camera of raw frames needs.
     #[error(
-        "rig.toml describes no sensor or no pixel format of the camera; add them (docs/cameras.md)"
+        "rig.toml describes no sensor or no pixel format of the camera; add them (docs/src/guides/camera.md)"
     )]
     NoSensor,
     /// A camera on a network.

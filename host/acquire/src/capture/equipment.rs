@@ -50,7 +50,7 @@ pub struct Equipment {
 pub enum EquipmentError {
     /// The rig does not say where its frames come from.
     #[error(
-        "{path}: has no [source]: say there where the frames come from (docs/session.md), or try --simulated"
+        "{path}: has no [source]: say there where the frames come from (docs/src/reference/files/rig.md), or try --simulated"
     )]
     NoSource {
         /// `rig.toml`.

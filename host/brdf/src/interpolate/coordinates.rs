@@ -13,7 +13,7 @@ pub type Point = [f32; 6];
 /// For p = 0 these are half vector and difference: sharp highlights depend on h alone. For p = 1 they are
 /// sum and difference, and with w = 1 the plain chord distance, rotated. In between, pairs of one half vector
 /// differ a little by the angle between light and view too, which pays on all but the sharpest materials
-/// (docs/results.md).
+/// (docs/src/figures/accuracy.md).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinates {
     /// The exponent p of the sum's length, 0 ..= 1.
@@ -108,7 +108,7 @@ impl std::fmt::Display for Coordinates {
 /// half/difference coordinates: `−½ ln cos θd`, θd the angle from the half vector to either. Lobes are
 /// about 1 / cos θd there, bases are flat, and these coordinates see little of it: the half vector hardly moves. Interpolating what is
 /// left takes about a quarter off the error of sharp materials where one polar angle is beyond 75° and the other beyond 60°
-/// (docs/results.md). Coordinates with the sum of light and view, which is 2 cos θd long, need none.
+/// (docs/src/figures/accuracy.md). Coordinates with the sum of light and view, which is 2 cos θd long, need none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Drift {
     /// `sin² θd` over the squared length of the second half of a point.

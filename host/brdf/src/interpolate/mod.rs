@@ -68,7 +68,7 @@ pub struct FillSettings {
     pub nugget_min: f32,
 }
 
-/// Points of the front of speed against accuracy; docs/results.md has their figures.
+/// Points of the front of speed against accuracy; docs/src/figures/accuracy.md has their figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
     /// A first look.
