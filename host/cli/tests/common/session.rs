@@ -1,7 +1,7 @@
 //! A small session on the simulated rig.
 
 use gonia_acquire::session::{
-    Beginning, Claim, ControllerIdentity, Entry, Provenance, SessionWriter,
+    Beginning, Claim, ControllerIdentity, Entry, SessionProvenance, SessionWriter,
 };
 use gonia_brdf::{Direction, Pose};
 use gonia_formats::plan_csv::write_plan_csv;
@@ -54,7 +54,7 @@ pub fn begin(folder: &Path, rig: &Rig, n: usize) -> SessionWriter {
         firmware: String::new(),
         config_crc: String::new(),
     };
-    let provenance = Provenance {
+    let provenance = SessionProvenance {
         program: "test".into(),
         began: String::new(),
         rig_crc: String::new(),
