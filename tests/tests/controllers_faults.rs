@@ -10,7 +10,7 @@ use gonia_brdf::{Direction, Pose};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{
-    Arm as ArmTrain, ControllerState, RequestOutcome, RequestRefusal, TriggerRole,
+    ControllerState, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
 };
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan, WireFaults};
@@ -59,8 +59,8 @@ fn refusal(result: Result<impl Sized, LinkError>) -> RequestRefusal {
     }
 }
 
-fn train(trigger: TriggerRole) -> ArmTrain {
-    ArmTrain {
+fn train(trigger: TriggerRole) -> TriggerRequest {
+    TriggerRequest {
         trigger,
         exposures_us: [1000, 4000, 16_000].into_iter().collect(),
         gap_us: 500,

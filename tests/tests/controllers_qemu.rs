@@ -15,7 +15,7 @@ use gonia::link::{Controller, LinkError, StreamTransport, Transport};
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{
-    Arm as TriggerRequest, ControllerState, RequestOutcome, RequestRefusal, TriggerRole,
+    ControllerState, RequestOutcome, RequestRefusal, TriggerRequest, TriggerRole,
 };
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::arm::SimulatedArm;
@@ -265,7 +265,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     let (good, bad) = (status.packets_good, status.packets_bad);
     let (lost, repeated) = arm.losses();
     println!(
-        "QEMU: {N_POSES} poses; frames {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
+        "QEMU: {N_POSES} poses; packets {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
     );
     assert!(bad > 0 && repeated > 0, "the wire bent nothing");
 
