@@ -265,7 +265,7 @@ fn arm_code_ends_where_the_simulator_does_over_a_wire_that_bends_bytes() {
     let (good, bad) = (status.packets_good, status.packets_bad);
     let (lost, repeated) = arm.losses();
     println!(
-        "QEMU: {N_POSES} poses; frames {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
+        "QEMU: {N_POSES} poses; packets {good} good, {bad} bent; {repeated} requests repeated, {lost} events lost"
     );
     assert!(bad > 0 && repeated > 0, "the wire bent nothing");
 

@@ -90,8 +90,8 @@ impl Line {
         while let Some(byte) = self.to_device.take(self.now_us) {
             self.node.receive(byte, self.now_us, &mut self.board);
         }
-        while let Some(frame) = self.node.take_packet() {
-            self.to_host.send(self.now_us, &frame);
+        while let Some(packet) = self.node.take_packet() {
+            self.to_host.send(self.now_us, &packet);
         }
     }
 }
@@ -143,7 +143,7 @@ fn soak(seed: u64, commands: u32) {
     let line = line.lock().unwrap();
     let done = &line.board.saved;
     println!(
-        "{commands} commands: {} saves done of {}, {repeats} requests repeated; frames at the \
+        "{commands} commands: {} saves done of {}, {repeats} requests repeated; packets at the \
          device: {} good, {} bent; {:.1} h virtual",
         done.len(),
         commands / 2,

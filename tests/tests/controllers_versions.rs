@@ -38,28 +38,28 @@ fn motions() -> Vec<Message> {
     ]
 }
 
-/// The frame that a host of another version would send.
-fn frame_of(version: u8, request: u16, message: &Message) -> Vec<u8> {
-    let frame = encode(NODE_LIGHT, request, message).unwrap();
-    let mut body = cobs::decode_vec(&frame[..frame.len() - 1]).unwrap();
+/// The packet that a host of another version would send.
+fn packet_of(version: u8, request: u16, message: &Message) -> Vec<u8> {
+    let packet = encode(NODE_LIGHT, request, message).unwrap();
+    let mut body = cobs::decode_vec(&packet[..packet.len() - 1]).unwrap();
     let checked = body.len() - 4;
     body[0] = version;
     let crc = crc32c(&body[..checked]);
     body[checked..].copy_from_slice(&crc.to_le_bytes());
-    let mut frame = cobs::encode_vec(&body);
-    frame.push(0);
-    frame
+    let mut packet = cobs::encode_vec(&body);
+    packet.push(0);
+    packet
 }
 
 /// Asks a controller of this firmware.
-fn ask(port: &SimPort, request: u16, frame: &[u8]) -> Message {
-    port.send(frame);
+fn ask(port: &SimPort, request: u16, packet: &[u8]) -> Message {
+    port.send(packet);
     let mut decoder = Decoder::new();
     for _ in 0..100 {
         let mut bytes = Vec::new();
         port.receive(&mut bytes, 10_000);
-        let mut frames = bytes.iter().filter_map(|&byte| decoder.push(byte));
-        if let Some(answer) = frames.find(|frame| frame.header.request == request) {
+        let mut packets = bytes.iter().filter_map(|&byte| decoder.push(byte));
+        if let Some(answer) = packets.find(|packet| packet.header.request == request) {
             return answer.message.unwrap();
         }
     }
@@ -74,7 +74,7 @@ fn new_firmware_refuses_every_motion_of_a_host_of_another_version() {
         let mut request = 0;
         let mut ask = |message: &Message| {
             request += 1;
-            ask(&port, request, &frame_of(version, request, message))
+            ask(&port, request, &packet_of(version, request, message))
         };
         let hello = ask(&Message::Hello(Hello { session: 7 }));
         let Message::Identity(identity) = hello else {
@@ -109,11 +109,11 @@ struct Other {
 impl Transport for Other {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut decoder = Decoder::new();
-        let frames = bytes.iter().filter_map(|&byte| decoder.push(byte));
+        let packets = bytes.iter().filter_map(|&byte| decoder.push(byte));
         self.sent
             .lock()
             .unwrap()
-            .extend(frames.map(|frame| frame.header.kind));
+            .extend(packets.map(|packet| packet.header.kind));
         self.port.send(bytes);
         Ok(())
     }

@@ -48,27 +48,23 @@ const CHUNK: usize = 64;
 pub async fn run(node: &mut ControllerNode, board: &mut impl Board) -> ! {
     let mut bytes = [0; CHUNK];
     loop {
-        round(node, board, &mut bytes).await;
-    }
-}
-
-async fn round(node: &mut ControllerNode, board: &mut impl Board, bytes: &mut [u8; CHUNK]) {
-    let now_us = board.now_us();
-    node.poll(now_us, board.pins(now_us));
-    while let Some(packet) = node.take_packet() {
-        board.send(&packet).await;
-    }
-    match board.sleep(node.wake_us(), bytes).await {
-        Wake::Time => {}
-        Wake::TriggerEdge => {
-            let now_us = board.now_us();
-            node.trigger_edge(now_us, board.pins(now_us));
+        let now_us = board.now_us();
+        node.poll(now_us, board.pins(now_us));
+        while let Some(packet) = node.take_packet() {
+            board.send(&packet).await;
         }
-        Wake::Bytes(received) => {
-            for &byte in bytes.iter().take(received) {
-                // A request may take long, such as one that saves settings.
+        match board.sleep(node.wake_us(), &mut bytes).await {
+            Wake::Time => {}
+            Wake::TriggerEdge => {
                 let now_us = board.now_us();
-                node.receive(byte, now_us, board.pins(now_us));
+                node.trigger_edge(now_us, board.pins(now_us));
+            }
+            Wake::Bytes(received) => {
+                for &byte in bytes.iter().take(received) {
+                    // A request may take long, such as one that saves settings.
+                    let now_us = board.now_us();
+                    node.receive(byte, now_us, board.pins(now_us));
+                }
             }
         }
     }
@@ -128,9 +124,10 @@ mod tests {
         }
     }
 
-    /// A board that gets its bytes once and then sleeps as long as it may.
+    /// A board that gets its bytes once, then sleeps as long as it may, twice, and then for ever.
     struct Bare {
         now_us: u64,
+        naps: u32,
         incoming: Option<PacketBytes>,
         sent: Vec<PacketBytes, 4>,
         pins: Pins,
@@ -155,6 +152,10 @@ mod tests {
 
         async fn sleep(&mut self, until_us: u64, bytes: &mut [u8]) -> Wake {
             let Some(incoming) = self.incoming.take() else {
+                if self.naps == 0 {
+                    core::future::pending::<()>().await;
+                }
+                self.naps -= 1;
                 self.now_us = until_us;
                 return Wake::Time;
             };
@@ -170,16 +171,13 @@ mod tests {
         let hello = Message::Hello(Hello { session: 7 });
         let mut board = Bare {
             now_us: 0,
+            naps: 2,
             incoming: Some(encode(NODE_LIGHT, 1, &hello).unwrap()),
             sent: Vec::new(),
             pins: Pins,
         };
-        let mut bytes = [0; CHUNK];
-        for _ in 0..3 {
-            let round = pin!(round(&mut node, &mut board, &mut bytes));
-            let polled = round.poll(&mut Context::from_waker(Waker::noop()));
-            assert_eq!(polled, Poll::Ready(()));
-        }
+        let polled = pin!(run(&mut node, &mut board)).poll(&mut Context::from_waker(Waker::noop()));
+        assert_eq!(polled, Poll::Pending);
         assert!(board.now_us > 0, "it slept until a tick");
         assert_eq!(node.controller().state(), ControllerState::Unhomed);
         let mut decoder = Decoder::new();

@@ -69,6 +69,7 @@ impl ControllerNode {
     }
 
     /// Does whatever is due.
+    #[inline(never)] // Flash: apart from the state machine of the main task, code is smaller.
     pub fn poll(&mut self, now_us: u64, hardware: &mut impl Hardware) {
         self.controller.poll(now_us, hardware);
         self.collect_events();
@@ -83,6 +84,7 @@ impl ControllerNode {
     }
 
     /// The other controller has raised the trigger wire.
+    #[inline(never)] // Flash: apart from the state machine of the main task, code is smaller.
     pub fn trigger_edge(&mut self, now_us: u64, hardware: &mut impl Hardware) {
         self.controller.trigger_edge(now_us, hardware);
         self.collect_events();
@@ -93,6 +95,7 @@ impl ControllerNode {
         self.outbox.pop_front()
     }
 
+    #[inline(never)] // Flash: apart from the state machine of the main task, code is smaller.
     fn serve(&mut self, received: &Received, now_us: u64, hardware: &mut impl Hardware) {
         let header = &received.header;
         let is_hello = matches!(received.message, Ok(Message::Hello(_)));
@@ -162,7 +165,6 @@ impl ControllerNode {
         }
     }
 
-    #[inline(never)] // Flash: it is called in several places.
     fn collect_events(&mut self) {
         while let Some(event) = self.controller.take_event() {
             if let Ok(packet) = encode(self.address, 0, &event) {

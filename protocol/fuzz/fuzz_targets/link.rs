@@ -2,9 +2,11 @@
 //! executed is what was asked, in its order, and never twice.
 #![no_main]
 
-use gonia_protocol::packet::{Decoder, PacketBytes};
-use gonia_protocol::link::{IncomingRequest, RetryPolicy, Requester, Responder, IncomingPacket, NextAction};
+use gonia_protocol::link::{
+    IncomingPacket, IncomingRequest, NextAction, Requester, Responder, RetryPolicy,
+};
 use gonia_protocol::message::{Message, Move};
+use gonia_protocol::packet::{Decoder, PacketBytes};
 use libfuzzer_sys::fuzz_target;
 
 const RETRY: RetryPolicy = RetryPolicy {

@@ -7,8 +7,8 @@ use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::steps::{End, Period, StepProgress};
 use gonia_protocol::NODE_LIGHT;
+use gonia_protocol::message::{ControllerState, Hello, Message, Move, ResetReason, Setting};
 use gonia_protocol::packet::encode;
-use gonia_protocol::message::{Hello, Message, Move, ResetReason, Setting, ControllerState};
 use gonia_protocol::settings::Axis;
 use libfuzzer_sys::fuzz_target;
 

@@ -12,7 +12,6 @@ impl ArmController {
         self.events.pop_front()
     }
 
-    #[inline(never)] // Flash: it is called in several places.
     pub(super) fn note_fault(&mut self, now_us: u64, code: FaultCode, axis: Option<Axis>) {
         if self.log.is_full() {
             self.log.pop_front();
@@ -28,7 +27,6 @@ impl ArmController {
     }
 
     /// Ends the request under way, if there is one.
-    #[inline(never)] // Flash: it is called in several places.
     pub(super) fn complete(&mut self, outcome: RequestOutcome) {
         self.stopping = false;
         let Some(request) = self.job.take() else {

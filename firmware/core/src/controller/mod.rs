@@ -157,7 +157,6 @@ impl ArmController {
         self.feed(hardware);
     }
 
-    #[inline(never)] // Flash: it is called in several places.
     fn feed(&mut self, hardware: &mut impl Hardware) {
         for drive in &mut self.drives {
             drive.feed(hardware);
@@ -213,7 +212,6 @@ impl ArmController {
     // ---- transitions ----
 
     /// The one place where the state changes.
-    #[inline(never)] // Flash: it is called in several places.
     fn enter(&mut self, state: ControllerState, now_us: u64) {
         if self.state == state {
             return;
@@ -238,7 +236,6 @@ impl ArmController {
         self.drop_work(RequestOutcome::Failed(FaultCode::INTERLOCK_OPEN));
     }
 
-    #[inline(never)] // Flash: it is called in several places.
     fn fault_unless_latched(
         &mut self,
         now_us: u64,
@@ -261,7 +258,6 @@ impl ArmController {
         self.fault(now_us, code, axis);
     }
 
-    #[inline(never)] // Flash: it is called in several places.
     fn halt(&mut self, hardware: &mut impl Hardware) {
         for drive in &mut self.drives {
             drive.halt(hardware);

@@ -73,7 +73,6 @@ impl ArmController {
     }
 
     /// Reads both encoders now; the first axis outside the trigger window, or whose reading is bad.
-    #[inline(never)] // Flash: it is called in several places.
     pub(super) fn axis_outside_window(
         &mut self,
         now_us: u64,
