@@ -13,7 +13,7 @@ use gonia_acquire::camera::{Camera, CameraError, GenicamCamera, RenderingCamera,
 use gonia_acquire::capture::{
     Arms, Ended, Orders, SessionEvent, ShotOptions, UnattendedSession, Watch, free_mb,
 };
-use gonia_acquire::session::{End, SessionFolder, SessionWriter, verify};
+use gonia_acquire::session::{SessionEnd, SessionFolder, SessionWriter, verify};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction};
 use gonia_formats::samples::read_samples;
@@ -187,13 +187,13 @@ fn a_session_through_gige_vision_has_the_samples_of_the_simulated_camera_whateve
     let camera = RenderingCamera::new(&rig, sim.clone(), 1, POSES, false);
     let writer = begin(direct.path(), &rig, POSES);
     let ended = run(direct.path(), writer, &sim, Box::new(camera));
-    assert_eq!(ended.end, End::Finished, "{}", ended.reason);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
     let expected = judge(direct.path());
 
     let began = Instant::now();
     let (calm, ended) = session_under(|_| None);
     println!("calm: {:.1} s", began.elapsed().as_secs_f64());
-    assert_eq!(ended[1].end, End::Finished, "{}", ended[1].reason);
+    assert_eq!(ended[1].end, SessionEnd::Finished, "{}", ended[1].reason);
     assert_eq!(ended.map(|e| e.retaken), [0, 0], "{}", journal(calm.path()));
     let calm = judge(calm.path());
 
@@ -211,7 +211,7 @@ fn a_session_through_gige_vision_has_the_samples_of_the_simulated_camera_whateve
     // Each is recovered by a retake or two.
     let retaken = ended[0].retaken + ended[1].retaken;
     assert!((7..=14).contains(&retaken), "{retaken}: {text}");
-    assert_eq!(ended[1].end, End::Finished, "{}", ended[1].reason);
+    assert_eq!(ended[1].end, SessionEnd::Finished, "{}", ended[1].reason);
     let verdict = verify(troubled.path()).unwrap();
     assert_eq!((verdict.done, verdict.broken().count()), (2 * POSES, 0));
     for said in [

@@ -2,7 +2,7 @@
 //!
 //! An axis moves at its own pace: it may be held up, or make corrections. So a leg of a way counts as
 //! clear only if *no* combination of angles between its ends is too near, whatever the timing. Where
-//! both arms cannot go at once they go one after the other, axis by axis, or over another elevation or
+//! both arms cannot go at once they go one after the other, axis by axis, or over another polar angle or
 //! another turn of the azimuth; the way with the fewest legs is taken.
 //!
 //! Angles here are those of the axes: \[θ, φ\] in degrees, φ not wrapped, θ below 0 beyond the zenith.
@@ -14,9 +14,9 @@ pub type Axes = [f64; 2];
 /// Light arm and camera arm.
 pub type Pair = [Axes; 2];
 
-/// Elevations by which one arm may pass the other.
+/// Polar angles at which one arm may pass the other.
 const PASSES_DEG: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
-/// Elevations within a leg are looked at in steps of this.
+/// Polar angles within a leg are checked in steps of this.
 const FINENESS_DEG: f64 = 0.5;
 /// What rounding may take off an angle.
 const SLACK_DEG: f64 = 1e-6;
@@ -75,7 +75,7 @@ fn trace(
     legs
 }
 
-/// Where an arm may stand in between: `from`, `to`, and both azimuths at every elevation to pass by.
+/// Where an arm may stand in between: `from`, `to`, and both azimuths at every polar angle to pass at.
 fn stations_of(from: Axes, to: Axes) -> Vec<Axes> {
     let elevations = [from[0], to[0]].into_iter().chain(PASSES_DEG);
     let crossed = elevations.flat_map(|theta| [from[1], to[1]].map(|phi| [theta, phi]));
@@ -105,7 +105,7 @@ fn moves_both(from: &Pair, to: &Pair) -> bool {
 }
 
 /// The smallest angle between any place that the light arm may be at on its way and any of the camera
-/// arm's, degrees: to about a fifth of a degree where both elevations change.
+/// arm's, degrees: to about a fifth of a degree where both polar angles change.
 fn nearest_deg(from: &Pair, to: &Pair) -> f64 {
     let [low, high] = [from[0][1] - from[1][1], to[0][1] - to[1][1]]
         .iter()

@@ -6,14 +6,14 @@ use gonia_protocol::settings::{Axis, Key};
 /// No frame is kept whose arms were further than this from their target, by encoder, degrees.
 pub const POINTING_LIMIT_DEG: f64 = 0.03;
 
-/// Time from the last step to the end of the settle window on the simulated rig, seconds. It is
+/// Time from the last step to the end of the settling time on the simulated rig, seconds. It is
 /// the same for every move, so a planner may leave it out of a comparison, not out of an estimate.
 pub const SETTLE_TIME_S: f64 = 0.25;
 
 /// Time of a move of one axis between two *axis* angles (φ not wrapped), seconds, without settling.
 ///
-/// The firmware's three boxes folded, p + r + j: d/v at full speed, v/a for the ramps, and the rise of
-/// acceleration; where full speed is not reached, p = r + j and d = a·p·r (`gonia_firmware::profile`).
+/// The firmware's three boxes folded, p + r + j: d/v at full speed, v/a for the ramps, and the jerk
+/// time; where full speed is not reached, p = r + j and d = a·p·r (`gonia_firmware::profile`).
 /// A move downwards goes past its target by the backlash take-up and comes back up.
 pub fn move_time_s(axis: Axis, from_deg: f64, to_deg: f64) -> f64 {
     let value = |key: Key| f64::from(key.default_of(axis)) * 1e-6;

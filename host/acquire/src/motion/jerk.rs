@@ -1,6 +1,6 @@
 //! What a limit of jerk brings: moves of one simulated axis by the firmware's own profile, from the
-//! first step until the axis has stayed within the deadband for the settle window; on arms that swing
-//! faster and slower than the one the defaults are made for, since nobody's arm is that one.
+//! first step until the axis has stayed within the in-position window for the settling time; on arms
+//! that swing faster and slower than the one the defaults are made for, since real arms differ from it.
 
 use core::f64::consts::TAU;
 use gonia_protocol::settings::{Axis, Key};
@@ -35,7 +35,8 @@ pub struct JerkRow {
     pub is_default: bool,
     /// From the beginning to the last step, mean of [`WAYS_DEG`], s.
     pub motion_s: f64,
-    /// Until the deadband is not left again, and the settle window is over, mean of all arms, s.
+    /// Until the in-position window is not left again, and the settling time is over, mean of all
+    /// arms, s.
     pub settled_s: f64,
     /// The same of the arm that takes longest.
     pub slowest_s: f64,

@@ -73,7 +73,7 @@ pub struct MotionRow {
     pub kept: usize,
     /// Poses given up.
     pub given_up: usize,
-    /// Faults that were got over.
+    /// Faults that were recovered automatically.
     pub recoveries: u32,
     /// Largest |commanded − true shaft angle| of a kept shot's four axes, degrees: the median.
     pub p50_deg: f64,
