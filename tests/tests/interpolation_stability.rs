@@ -586,14 +586,7 @@ fn plan(truth: &dyn Brdf) -> Vec<Sample> {
 }
 
 fn sample(truth: &dyn Brdf, i: Direction, v: Direction, frame: usize) -> Sample {
-    Sample {
-        theta_i_deg: i.theta_deg() as f32,
-        phi_i_deg: i.phi_deg() as f32,
-        theta_v_deg: v.theta_deg() as f32,
-        phi_v_deg: v.phi_deg() as f32,
-        rgb: truth.eval(i.to_vec3(), v.to_vec3()).map(|x| x as f32),
-        frame: frame as u32,
-    }
+    Sample::new(i, v, truth.eval(i.to_vec3(), v.to_vec3()).map(|x| x as f32)).in_frame(frame as u32)
 }
 
 fn with_retro_hole(truth: &dyn Brdf) -> Vec<Sample> {
@@ -607,7 +600,7 @@ fn with_retro_hole(truth: &dyn Brdf) -> Vec<Sample> {
     plan(truth).into_iter().filter(|s| apart(s) > 8.0).collect()
 }
 
-/// Samples on either side of the border between two bins' elevations.
+/// Samples on either side of the border between two bins' polar angles.
 fn pairs_across_borders(truth: &dyn Brdf) -> Vec<Sample> {
     let mut samples = plan(truth);
     let border = |theta: f32| 6.0 * (theta / 6.0).floor() + 3.0;

@@ -28,9 +28,9 @@ impl Sample {
     pub fn new(light: Direction, view: Direction, rgb: [f32; 3]) -> Self {
         Self {
             theta_i_deg: light.theta_deg() as f32,
-            phi_i_deg: light.phi_deg() as f32,
+            phi_i_deg: phi_deg(light),
             theta_v_deg: view.theta_deg() as f32,
-            phi_v_deg: view.phi_deg() as f32,
+            phi_v_deg: phi_deg(view),
             rgb,
             frame: Self::NO_FRAME,
         }
@@ -40,5 +40,23 @@ impl Sample {
     #[must_use]
     pub fn in_frame(self, frame: u32) -> Self {
         Self { frame, ..self }
+    }
+}
+
+/// φ in [0, 360) in single precision too, where 359.99999 rounds to 360.
+fn phi_deg(direction: Direction) -> f32 {
+    let phi = direction.phi_deg() as f32;
+    if phi >= 360.0 { 0.0 } else { phi }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_azimuth_just_below_a_turn_is_none_and_not_a_whole_one() {
+        let light = Direction::from_deg(30.0, 359.999_999_9);
+        let sample = Sample::new(light, light, [1.0; 3]);
+        assert_eq!((sample.phi_i_deg, sample.phi_v_deg), (0.0, 0.0));
     }
 }

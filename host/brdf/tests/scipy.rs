@@ -55,14 +55,11 @@ fn bins() -> Bins {
             let cell = k * 104_729 % (288 * 288);
             let light = grid.direction(36 + cell as usize / 288);
             let view = grid.direction(36 + cell as usize % 288);
-            Sample {
-                theta_i_deg: light.theta_deg() as f32,
-                phi_i_deg: light.phi_deg() as f32,
-                theta_v_deg: view.theta_deg() as f32,
-                phi_v_deg: view.phi_deg() as f32,
-                rgb: value(light.to_vec3(), view.to_vec3()).map(|v| v as f32),
-                frame: Sample::NO_FRAME,
-            }
+            Sample::new(
+                light,
+                view,
+                value(light.to_vec3(), view.to_vec3()).map(|v| v as f32),
+            )
         })
         .collect();
     let bins = Bins::new(grid, &samples);

@@ -17,7 +17,7 @@ use std::sync::Arc;
 mod clock;
 use clock::{mean, median_ms};
 
-/// Poses over the plan's elevations, one of them with the light's head in the way.
+/// Poses over the plan's polar angles, one of them with the light's head in the way.
 const POSES: [[f64; 4]; 7] = [
     [0.0, 0.0, 0.0, 0.0],
     [30.0, 140.0, 15.0, 60.0],

@@ -3,26 +3,12 @@
 
 mod common;
 
-use common::{gonia, text};
+use common::{gonia, refused, text};
 use gonia_formats::frame_exr::write_frame;
 use gonia_formats::rig_toml::write_rig;
 use gonia_rig::{Frame, Rig};
 use std::fs;
 use std::path::Path;
-
-/// Runs a command that must fail, and gives the line it said why.
-fn refused(arguments: &[&str], input: &str) -> String {
-    let output = gonia(arguments, input);
-    let errors = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
-    let said: Vec<&str> = errors
-        .lines()
-        .filter(|l| l.starts_with("gonia: "))
-        .collect();
-    assert_eq!(said.len(), 1, "{arguments:?}: {errors}");
-    assert!(!errors.contains("panicked"), "{errors}");
-    said[0].to_owned()
-}
 
 fn frame(value: f32) -> Frame {
     Frame {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{gonia, gonia_ok, text};
+use common::{gonia, gonia_ok, refused, text};
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::model::{Brdf, Kurt};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
@@ -28,19 +28,6 @@ fn write(path: &Path, step_deg: f64, model: &dyn Brdf, scale: Scale) {
         },
     )
     .unwrap();
-}
-
-/// The single line of a command that failed with exit code 1.
-fn refused(arguments: &[&str]) -> String {
-    let output = gonia(arguments, "");
-    let errors = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
-    let said: Vec<&str> = errors
-        .lines()
-        .filter(|l| l.starts_with("gonia: "))
-        .collect();
-    assert_eq!(said.len(), 1, "{arguments:?}: {errors}");
-    said[0].to_owned()
 }
 
 #[test]
@@ -82,7 +69,7 @@ fn a_fit_that_does_not_converge_says_so_and_marks_what_it_keeps() {
         "--iterations",
         "1",
     ];
-    let said = refused(&arguments);
+    let said = refused(&arguments, "");
     assert!(
         said.contains("did not converge") && said.contains("best so far"),
         "{said}"
@@ -151,7 +138,7 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
         ),
     ];
     for (arguments, word) in cases {
-        let said = refused(arguments);
+        let said = refused(arguments, "");
         assert!(said.contains(word), "{arguments:?}: {said}");
         assert!(!path("out.png").exists());
     }
@@ -235,14 +222,10 @@ fn session(model: &dyn Brdf) -> Vec<Sample> {
                 let l = local_direction(*light, 1.1, point);
                 let e = local_direction(*view, 1.8, point);
                 let (ld, ed) = (Direction::from_vec3(l), Direction::from_vec3(e));
-                samples.push(Sample {
-                    theta_i_deg: ld.theta_deg() as f32,
-                    phi_i_deg: ld.phi_deg() as f32,
-                    theta_v_deg: ed.theta_deg() as f32,
-                    phi_v_deg: ed.phi_deg() as f32,
-                    rgb: model.eval(l, e).map(|f| f as f32),
-                    frame: (i * arms.len() + v) as u32,
-                });
+                samples.push(
+                    Sample::new(ld, ed, model.eval(l, e).map(|f| f as f32))
+                        .in_frame((i * arms.len() + v) as u32),
+                );
             }
         }
     }
@@ -261,7 +244,7 @@ fn baselines_are_made_compared_and_shown_in_the_report() {
         ("12", "a multiple of the measurement's 5 degrees"),
         ("30", "at most 20"),
     ] {
-        let said = refused(&["rivals", text(dir.path()), "--step", step]);
+        let said = refused(&["rivals", text(dir.path()), "--step", step], "");
         assert!(said.contains(word), "{said}");
     }
     let made = |more: &[&str]| {

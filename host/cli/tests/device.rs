@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{gonia, gonia_ok};
+use common::{gonia_ok, refused};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
@@ -32,18 +32,6 @@ fn start() -> (SimDevice, [String; 2]) {
         line.strip_prefix(name).unwrap().trim().to_owned()
     });
     (device, ports)
-}
-
-fn refused(arguments: &[&str], input: &str) -> String {
-    let output = gonia(arguments, input);
-    let errors = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
-    let said: Vec<&str> = errors
-        .lines()
-        .filter(|l| l.starts_with("gonia: "))
-        .collect();
-    assert_eq!(said.len(), 1, "{errors}");
-    said[0].to_owned()
 }
 
 /// The value in a printed row.

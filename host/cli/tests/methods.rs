@@ -26,14 +26,10 @@ fn data(folder: &Path) {
                 let i = local_direction(*light, 1.1, point);
                 let o = local_direction(*view, 1.8, point);
                 let (di, dv) = (Direction::from_vec3(i), Direction::from_vec3(o));
-                samples.push(Sample {
-                    theta_i_deg: di.theta_deg() as f32,
-                    phi_i_deg: di.phi_deg() as f32,
-                    theta_v_deg: dv.theta_deg() as f32,
-                    phi_v_deg: dv.phi_deg() as f32,
-                    rgb: cloth.eval(i, o).map(|x| x as f32),
-                    frame: (l * arms.len() + v) as u32,
-                });
+                samples.push(
+                    Sample::new(di, dv, cloth.eval(i, o).map(|x| x as f32))
+                        .in_frame((l * arms.len() + v) as u32),
+                );
             }
         }
     }

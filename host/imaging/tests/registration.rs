@@ -13,7 +13,7 @@ const CORNERS: [[f64; 2]; 4] = [
     [-335.0, 335.0],
 ];
 
-/// Elevations and azimuths of the plan's rings, some with lines parallel to the rows.
+/// Polar angles and azimuths of the plan's rings, some with lines parallel to the rows.
 const VIEWS: [[f64; 2]; 10] = [
     [0.0, 0.0],
     [15.0, 60.0],

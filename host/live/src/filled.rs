@@ -146,14 +146,7 @@ mod tests {
                 let at = [0, 1].map(|i| 1e-3 * (at[i] + f64::from(offset[i])));
                 let [i, v] = [(pose.light, 1.1), (pose.view, 1.8)]
                     .map(|(arm, m)| Direction::from_vec3(local_direction(arm, m, at)));
-                Some(Sample {
-                    theta_i_deg: i.theta_deg() as f32,
-                    phi_i_deg: i.phi_deg() as f32,
-                    theta_v_deg: v.theta_deg() as f32,
-                    phi_v_deg: v.phi_deg() as f32,
-                    rgb: [1.0; 3],
-                    frame: 0,
-                })
+                Some(Sample::new(i, v, [1.0; 3]).in_frame(0))
             })
             .collect();
         let bins = Bins::new(Grid::PAPER, &samples);

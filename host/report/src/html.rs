@@ -219,7 +219,7 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
     html! {
         h2 { "Slices over both azimuths" }
         p.soft {
-            "Elevation of the light from row to row, of the view from column to column. Isotropic reflection would \
+            "Polar angle of the light from row to row, of the view from column to column. Isotropic reflection would \
              show as stripes along the diagonal; threads show as what breaks them."
         }
         div.sheets {

@@ -9,9 +9,9 @@ const THETA_DEG: [f64; 3] = [30.0, 60.0, 74.0];
 
 /// One slice: `n` × `n` values, φv to the right, φi upwards (the first row is the last φi).
 pub struct Slice<T> {
-    /// Elevation of the light, degrees (of the nearest node).
+    /// Polar angle of the light, degrees (of the nearest node).
     pub theta_i_deg: f64,
-    /// Elevation of the view, degrees.
+    /// Polar angle of the view, degrees.
     pub theta_v_deg: f64,
     /// Values from the top left.
     pub values: Vec<T>,

@@ -21,9 +21,9 @@ pub struct CameraModel {
 /// Small deviations of the camera from where its arm says it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraShift {
-    /// Elevation, radians.
+    /// Of the polar angle, radians.
     pub theta: f64,
-    /// Azimuth, radians.
+    /// Of the azimuth, radians.
     pub phi: f64,
     /// Turn about the optical axis, radians.
     pub roll: f64,

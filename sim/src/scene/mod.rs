@@ -60,7 +60,7 @@ pub struct SceneGeometry {
 
 impl SceneGeometry {
     /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
-    /// elevation up to 75°.
+    /// polar angle up to 75°.
     pub fn paper(px: usize) -> Self {
         Self {
             light_distance_m: 1.1,

@@ -77,8 +77,8 @@ fn trace(
 
 /// Where an arm may stand in between: `from`, `to`, and both azimuths at every polar angle to pass at.
 fn stations_of(from: Axes, to: Axes) -> Vec<Axes> {
-    let elevations = [from[0], to[0]].into_iter().chain(PASSES_DEG);
-    let crossed = elevations.flat_map(|theta| [from[1], to[1]].map(|phi| [theta, phi]));
+    let polar_angles = [from[0], to[0]].into_iter().chain(PASSES_DEG);
+    let crossed = polar_angles.flat_map(|theta| [from[1], to[1]].map(|phi| [theta, phi]));
     let mut stations = vec![from, to];
     for station in crossed {
         if !stations[2..].contains(&station) {
@@ -116,15 +116,15 @@ fn nearest_deg(from: &Pair, to: &Pair) -> f64 {
     // cos of the smallest and of the largest difference of azimuth, the short way round.
     let near = turned_to(0.0, low, high).to_radians().cos();
     let far = -turned_to(180.0, low, high).to_radians().cos();
-    let elevations = |arm: usize| {
+    let polar_angles = |arm: usize| {
         let (a, b) = (from[arm][0], to[arm][0]);
         let n = ((b - a).abs() / FINENESS_DEG).ceil().max(1.0) as usize;
         let last = if a == b { 0 } else { n };
         (0..=last).map(move |i| (a + (b - a) * i as f64 / n as f64).to_radians().sin_cos())
     };
     let mut most = -1.0f64;
-    for (sin, cos) in elevations(0) {
-        for (other_sin, other_cos) in elevations(1) {
+    for (sin, cos) in polar_angles(0) {
+        for (other_sin, other_cos) in polar_angles(1) {
             let across = sin * other_sin;
             // Beyond the zenith the far side is the near one.
             let azimuth = if across >= 0.0 { near } else { far };

@@ -136,14 +136,8 @@ pub fn measure_with(model: &dyn Brdf, noise: f64, poses: &Poses) -> Vec<Sample> 
                 let value = model.eval(l, v);
                 let noise = [0, 1, 2].map(|c| 1.0 + noise * normal((frame * 1225 + k) * 3 + c));
                 let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-                Sample {
-                    theta_i_deg: l.theta_deg() as f32,
-                    phi_i_deg: l.phi_deg() as f32,
-                    theta_v_deg: v.theta_deg() as f32,
-                    phi_v_deg: v.phi_deg() as f32,
-                    rgb: [0, 1, 2].map(|c| (value[c] * noise[c]) as f32),
-                    frame: frame as u32,
-                }
+                Sample::new(l, v, [0, 1, 2].map(|c| (value[c] * noise[c]) as f32))
+                    .in_frame(frame as u32)
             })
         })
         .collect()

@@ -225,16 +225,14 @@ mod tests {
             .filter(|(light, _)| *light >= grid.n_phi())
             .map(|(light, view)| {
                 let (light, view) = (grid.direction(light), grid.direction(view));
-                Sample {
-                    theta_i_deg: light.theta_deg() as f32,
-                    phi_i_deg: light.phi_deg() as f32,
-                    theta_v_deg: view.theta_deg() as f32,
-                    phi_v_deg: view.phi_deg() as f32,
-                    rgb: model
+                Sample::new(
+                    light,
+                    view,
+                    model
                         .eval(light.to_vec3(), view.to_vec3())
                         .map(|v| v as f32),
-                    frame: 0,
-                }
+                )
+                .in_frame(0)
             })
             .collect();
         Bins::new(grid, &samples)

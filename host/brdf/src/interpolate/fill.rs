@@ -228,16 +228,14 @@ mod tests {
                 let theta = |u: f64| (1.0 - u * (1.0 - cos_max)).acos().to_degrees();
                 let light = Direction::from_deg(theta(halton(k, 2)), 360.0 * halton(k, 3));
                 let view = Direction::from_deg(theta(halton(k, 5)), 360.0 * halton(k, 7));
-                Sample {
-                    theta_i_deg: light.theta_deg() as f32,
-                    phi_i_deg: light.phi_deg() as f32,
-                    theta_v_deg: view.theta_deg() as f32,
-                    phi_v_deg: view.phi_deg() as f32,
-                    rgb: model
+                Sample::new(
+                    light,
+                    view,
+                    model
                         .eval(light.to_vec3(), view.to_vec3())
                         .map(|v| v as f32),
-                    frame: 0,
-                }
+                )
+                .in_frame(0)
             })
             .collect()
     }

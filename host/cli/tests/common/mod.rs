@@ -32,3 +32,18 @@ pub fn gonia_ok(arguments: &[&str], input: &str) -> String {
 pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
+
+/// Runs `gonia`, which must end with exit code 1 and one line; that line.
+#[allow(dead_code)]
+pub fn refused(arguments: &[&str], input: &str) -> String {
+    let output = gonia(arguments, input);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
+    let said: Vec<&str> = errors
+        .lines()
+        .filter(|line| line.starts_with("gonia: "))
+        .collect();
+    assert_eq!(said.len(), 1, "{arguments:?}: {errors}");
+    assert!(!errors.contains("panicked"), "{errors}");
+    said[0].to_owned()
+}

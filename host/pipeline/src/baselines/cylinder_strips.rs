@@ -55,14 +55,7 @@ pub fn measure_on_strips(material: &dyn Brdf, seed: u64) -> Vec<Sample> {
                         (f[c] * (1.0 + own) + pixel).max(1e-4) as f32
                     });
                     let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-                    Sample {
-                        theta_i_deg: l.theta_deg() as f32,
-                        phi_i_deg: l.phi_deg() as f32,
-                        theta_v_deg: v.theta_deg() as f32,
-                        phi_v_deg: v.phi_deg() as f32,
-                        rgb,
-                        frame: image as u32,
-                    }
+                    Sample::new(l, v, rgb).in_frame(image as u32)
                 })
             })
         })

@@ -87,14 +87,10 @@ mod tests {
                     continue;
                 }
                 let (l, v) = (fine.direction(i), fine.direction(v));
-                samples.push(Sample {
-                    theta_i_deg: l.theta_deg() as f32,
-                    phi_i_deg: l.phi_deg() as f32,
-                    theta_v_deg: v.theta_deg() as f32,
-                    phi_v_deg: v.phi_deg() as f32,
-                    rgb: model.eval(l.to_vec3(), v.to_vec3()).map(|f| f as f32),
-                    frame: 0,
-                });
+                samples.push(
+                    Sample::new(l, v, model.eval(l.to_vec3(), v.to_vec3()).map(|f| f as f32))
+                        .in_frame(0),
+                );
             }
         }
         let bins = Bins::new(fine, &samples);

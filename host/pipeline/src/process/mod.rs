@@ -348,14 +348,7 @@ impl Bench<'_> {
                 Direction::from_vec3(to_light),
                 Direction::from_vec3(to_camera),
             );
-            samples.push(Sample {
-                theta_i_deg: i.theta_deg() as f32,
-                phi_i_deg: phi_f32(i),
-                theta_v_deg: v.theta_deg() as f32,
-                phi_v_deg: phi_f32(v),
-                rgb,
-                frame: row.frame,
-            });
+            samples.push(Sample::new(i, v, rgb).in_frame(row.frame));
         }
         Ok((report, samples, counts))
     }
@@ -379,10 +372,4 @@ impl Bench<'_> {
             local_direction(view, self.rig.camera.distance_m, at),
         )
     }
-}
-
-/// φ in [0, 360) in single precision too, where 359.99999 rounds to 360.
-fn phi_f32(d: Direction) -> f32 {
-    let phi = d.phi_deg() as f32;
-    if phi >= 360.0 { 0.0 } else { phi }
 }
