@@ -1,6 +1,7 @@
 //! `gonia chart`: what accuracy costs, of interpolation or of the arms.
 
 use crate::progress::Progress;
+use crate::remarks;
 use crate::{chart_motion, table};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Bins, Grid, Sample};
@@ -70,10 +71,11 @@ impl Chart {
             bail!("--tests {}: must lie in 100..=1000000", self.tests);
         }
         let progress = Progress::new();
-        let samples = progress.stage("reading samples", |_| read_samples(path))?;
+        let read = progress.stage("reading samples", |_| read_samples(path))?;
+        remarks::print(&read.remarks);
         check_writable(&self.out)?;
         let (samples, tests) = self
-            .test_set(samples, grid, &progress)
+            .test_set(read.samples, grid, &progress)
             .with_context(|| path.display().to_string())?;
         println!("compared with {}", tests.basis());
         if self.only != Some(Only::Images) {

@@ -1,6 +1,7 @@
 //! `gonia fill`: samples → bins → dense BRDF.
 
 use crate::progress::Progress;
+use crate::remarks;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{ErrorBars, Origin, Preset};
@@ -117,8 +118,10 @@ impl Fill {
         }
         let progress = Progress::new();
         let names = self.names();
+        let read = progress.stage("reading samples", |_| read_samples_of_all(&self.samples))?;
+        remarks::print(&read.remarks);
         let samples = SampleSet {
-            samples: progress.stage("reading samples", |_| read_samples_of_all(&self.samples))?,
+            samples: read.samples,
             scale: self.scale.into(),
         };
         let facts = Provenance::from([("samples".to_owned(), names.clone())]);

@@ -1,6 +1,7 @@
 //! `gonia fit`: an analytic model fitted to a dense BRDF.
 
 use crate::progress::Progress;
+use crate::remarks;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
@@ -89,8 +90,9 @@ impl Fit {
         let cells = match &self.samples {
             None => cells_of_dense(&measured.brdf, &settings),
             Some(path) => {
-                let samples = progress.stage("reading samples", |_| read_samples(path))?;
-                cells_of_samples(&measured.brdf, &samples, &settings)
+                let read = progress.stage("reading samples", |_| read_samples(path))?;
+                remarks::print(&read.remarks);
+                cells_of_samples(&measured.brdf, &read.samples, &settings)
                     .with_context(|| path.display().to_string())?
             }
         };

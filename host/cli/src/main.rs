@@ -19,6 +19,7 @@ mod process;
 mod progress;
 mod query;
 mod rectify;
+mod remarks;
 mod render;
 mod report;
 mod rivals;

@@ -1,6 +1,7 @@
 //! `gonia plan --adaptive`: what to measure next.
 
 use crate::progress::Progress;
+use crate::remarks;
 use anyhow::{Context, Result, bail};
 use gonia_formats::samples::read_samples_of_all;
 use gonia_pipeline::chart::poses_of;
@@ -27,8 +28,9 @@ const LIGHT_MAX_DEG: f64 = 85.0;
 /// Samples that cannot be read, or that do not say their frames, or of too few frames.
 pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> Result<Proposal> {
     let progress = Progress::new();
-    let samples = progress.stage("reading samples", |_| read_samples_of_all(samples))?;
-    let measured = poses_of(&samples);
+    let read = progress.stage("reading samples", |_| read_samples_of_all(samples))?;
+    remarks::print(&read.remarks);
+    let measured = poses_of(&read.samples);
     if measured.is_empty() {
         bail!(
             "the samples do not say which frames they came from: give samples with a frame column, as \
@@ -36,7 +38,7 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
         );
     }
     let set = SampleSet {
-        samples,
+        samples: read.samples,
         scale: Scale::Relative,
     };
     let options = FillOptions {

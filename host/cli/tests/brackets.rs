@@ -105,7 +105,9 @@ fn brackets_of_rgb_and_bayer_sensors_become_absolute_samples() {
             printed.contains("absolute") && printed.contains("0 saturated"),
             "{printed}"
         );
-        let samples = read_samples(&dir.path().join("samples.npy")).unwrap();
+        let samples = read_samples(&dir.path().join("samples.npy"))
+            .unwrap()
+            .samples;
         assert_eq!(samples.len(), POSES.len() * 1225);
         let material = Kurt::two_thread_fabric();
         for frame in 0..POSES.len() as u32 {
@@ -139,7 +141,9 @@ fn saturated_patches_are_left_out_and_counted_and_merged_frames_can_be_looked_at
     // Too long for the brighter half of the reference.
     write_folder(dir.path(), None, &[0.24, 0.8]);
     let printed = gonia_ok(&["process", text(dir.path())], "");
-    let samples = read_samples(&dir.path().join("samples.npy")).unwrap();
+    let samples = read_samples(&dir.path().join("samples.npy"))
+        .unwrap()
+        .samples;
     assert!(samples.len() < POSES.len() * 1225, "{printed}");
     assert!(!printed.contains(" 0 saturated"), "{printed}");
 

@@ -139,7 +139,9 @@ fn a_known_reference_gives_absolute_values_under_an_uneven_lamp() {
     write_folder(folder.path(), &rig, true, 0.4);
     let printed = gonia_ok(&["process", text(folder.path())], "");
     assert!(printed.contains("absolute"), "{printed}");
-    let samples = read_samples(&folder.path().join("samples.npy")).unwrap();
+    let samples = read_samples(&folder.path().join("samples.npy"))
+        .unwrap()
+        .samples;
     for (k, (pose, albedo)) in POSES.iter().enumerate() {
         let here = of_frame(&samples, 10 + k as u32);
         assert!(here.len() >= 1200, "{} of 1225 points", here.len());
@@ -169,7 +171,7 @@ fn without_a_reference_values_follow_the_ideal_light_and_say_so() {
     let output = folder.path().join("out.csv");
     let printed = gonia_ok(&["process", text(folder.path()), "-o", text(&output)], "");
     assert!(printed.contains("relative"), "{printed}");
-    let samples = read_samples(&output).unwrap();
+    let samples = read_samples(&output).unwrap().samples;
     for (k, (_, albedo)) in POSES.iter().enumerate() {
         let here = of_frame(&samples, 10 + k as u32);
         assert!(here.len() >= 1200, "{} of 1225 points", here.len());

@@ -55,8 +55,8 @@ fn the_quick_demo_measures_the_fabric_and_its_files_serve_every_command() {
     let again = file("again.npy");
     let printed = gonia_ok(&["process", text(&out), "-o", &again], "");
     assert!(printed.contains("eq. (3)"), "{printed}");
-    let a = read_samples(&out.join("samples.npy")).unwrap();
-    let b = read_samples(Path::new(&again)).unwrap();
+    let a = read_samples(&out.join("samples.npy")).unwrap().samples;
+    let b = read_samples(Path::new(&again)).unwrap().samples;
     assert!((a.len() as f64 / b.len() as f64 - 1.0).abs() < 1e-3);
     let mean = |samples: &[gonia_brdf::Sample]| {
         samples.iter().map(|s| f64::from(s.rgb[1])).sum::<f64>() / samples.len() as f64

@@ -157,7 +157,7 @@ fn session_under(troubles: GigeTroubles) -> (tempfile::TempDir, [Ended; 2]) {
 fn judge(folder: &Path) -> (usize, f64, f64) {
     let file = folder.join("samples.npy");
     gonia_ok(&["process", text(folder), "-o", text(&file)], "");
-    let samples = read_samples(&file).unwrap();
+    let samples = read_samples(&file).unwrap().samples;
     let material = Kurt::two_thread_fabric();
     let mut logs = Vec::new();
     for s in samples.iter() {

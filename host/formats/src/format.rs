@@ -6,7 +6,7 @@ use crate::FileError;
 use gonia_brdf::interpolate::{ByRows, ErrorBars};
 use gonia_brdf::progress::Progress;
 use gonia_brdf::{Brdf, Grid, Sample};
-use gonia_rig::{DenseFile, Scale};
+use gonia_rig::{DenseFile, Remark, Scale};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -81,10 +81,30 @@ pub(crate) trait CellReader: Send {
     fn cell(&self, light: usize, view: usize) -> Result<[f32; 3], FileError>;
 }
 
+/// Samples as a file holds them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SamplesRead {
+    /// The samples, in the order of the file.
+    pub samples: Vec<Sample>,
+    /// Whether their values are 1/sr, where the file says so.
+    pub scale: Option<Scale>,
+    /// What was assumed of the file, and what in it cannot be trusted.
+    pub remarks: Vec<Remark>,
+}
+
+impl From<Vec<Sample>> for SamplesRead {
+    fn from(samples: Vec<Sample>) -> Self {
+        Self {
+            samples,
+            ..Self::default()
+        }
+    }
+}
+
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
-    pub read: fn(&Path) -> Result<Vec<Sample>, FileError>,
+    pub read: fn(&Path) -> Result<SamplesRead, FileError>,
     /// Writes a file whole.
     pub write: fn(&Path, &[Sample]) -> Result<(), FileError>,
 }

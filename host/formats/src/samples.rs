@@ -4,6 +4,8 @@
 //! Columns: `theta_i, phi_i, theta_v, phi_v` in degrees, `r, g, b`, and optionally `frame`, −1
 //! where it is unknown.
 
+pub use crate::format::SamplesRead;
+
 use crate::format::{Content, SampleFormat};
 use crate::sample_rows::LAST_FRAME;
 use crate::{FileError, table};
@@ -16,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// One line naming the file and, where there is one, the row (counted from 0 in `.npy`) or line:
 /// of no known format, another shape, type or order, a value that is not finite, a polar angle outside
 /// 0° ≤ θ ≤ 90°, or a frame number that is none.
-pub fn read_samples(path: &Path) -> Result<Vec<Sample>, FileError> {
+pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
     (format_of_file(path)?.read)(path)
 }
 
@@ -25,11 +27,17 @@ pub fn read_samples(path: &Path) -> Result<Vec<Sample>, FileError> {
 ///
 /// # Errors
 /// As [`read_samples`], and more frames than a file can number.
-pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<Vec<Sample>, FileError> {
-    let mut all: Vec<Sample> = Vec::new();
+pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<SamplesRead, FileError> {
+    let mut all = SamplesRead::default();
     let mut next = 0u32;
     for path in paths {
-        let mut samples = read_samples(path)?;
+        let SamplesRead {
+            mut samples,
+            scale,
+            mut remarks,
+        } = read_samples(path)?;
+        all.remarks.append(&mut remarks);
+        all.scale = all.scale.or(scale);
         let mut last = None;
         for sample in &mut samples {
             if sample.frame != Sample::NO_FRAME {
@@ -47,10 +55,10 @@ pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<Vec<Sample>, FileError> 
             }
             next = last + 1;
         }
-        if all.is_empty() {
-            all = samples;
+        if all.samples.is_empty() {
+            all.samples = samples;
         } else {
-            all.append(&mut samples);
+            all.samples.append(&mut samples);
         }
     }
     Ok(all)
@@ -121,7 +129,7 @@ mod tests {
         for name in ["a.npy", "a.csv"] {
             let path = dir.path().join(name);
             write_samples(&path, &samples).unwrap();
-            assert_eq!(read_samples(&path).unwrap(), samples, "{name}");
+            assert_eq!(read_samples(&path).unwrap().samples, samples, "{name}");
         }
         for sample in &mut samples {
             sample.frame = Sample::NO_FRAME;
@@ -129,7 +137,7 @@ mod tests {
         for name in ["b.npy", "b.csv"] {
             let path = dir.path().join(name);
             write_samples(&path, &samples).unwrap();
-            assert_eq!(read_samples(&path).unwrap(), samples, "{name}");
+            assert_eq!(read_samples(&path).unwrap().samples, samples, "{name}");
         }
         let other = dir.path().join("a.txt");
         let error = write_samples(&other, &samples).unwrap_err().to_string();
@@ -139,7 +147,7 @@ mod tests {
         assert!(error.ends_with("name it .npy or .csv"), "{error}");
         // The first bytes of a .npy say what it is.
         std::fs::copy(dir.path().join("b.npy"), &other).unwrap();
-        assert_eq!(read_samples(&other).unwrap(), samples);
+        assert_eq!(read_samples(&other).unwrap().samples, samples);
         let foreign = dir.path().join("a.dat");
         std::fs::write(&foreign, "x").unwrap();
         let error = read_samples(&foreign).unwrap_err().to_string();
@@ -152,12 +160,12 @@ mod tests {
         let [a, b] = ["a.npy", "b.csv"].map(|name| dir.path().join(name));
         write_samples(&a, &some_samples(2500)).unwrap();
         write_samples(&b, &some_samples(1300)).unwrap();
-        let all = read_samples_of_all(&[a.clone(), b]).unwrap();
+        let all = read_samples_of_all(&[a.clone(), b]).unwrap().samples;
         assert_eq!(all.len(), 3800);
         assert_eq!(
             (all[2499].frame, all[2500].frame, all[3799].frame),
             (2, 3, 4)
         );
-        assert_eq!(all[..2500], read_samples(&a).unwrap());
+        assert_eq!(all[..2500], read_samples(&a).unwrap().samples);
     }
 }

@@ -1,7 +1,7 @@
 //! Samples as `.csv`.
 
 use crate::csv_table::CsvTable;
-use crate::format::{Content, Format, SampleFormat};
+use crate::format::{Content, Format, SampleFormat, SamplesRead};
 use crate::sample_rows::{COLUMNS, frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, write_whole};
 use gonia_brdf::Sample;
@@ -16,7 +16,7 @@ pub(super) static FORMAT: Format = Format {
     content: Content::Samples(SampleFormat { read, write }),
 };
 
-fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
+fn read(path: &Path) -> Result<SamplesRead, FileError> {
     let mut table = CsvTable::open(path)?;
     let mut columns = Vec::with_capacity(8);
     for name in &COLUMNS[..7] {
@@ -33,7 +33,7 @@ fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
             .map_err(|bad| table.wrong(bad.problem, bad.remedy))?;
         samples.push(sample);
     }
-    Ok(samples)
+    Ok(samples.into())
 }
 
 fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
@@ -70,7 +70,7 @@ mod tests {
             std::fs::write(&path, format!("{header}{rows}")).unwrap();
             read_samples(&path)
         };
-        let samples = read("1,2,3,10,20,30,40\n").unwrap();
+        let samples = read("1,2,3,10,20,30,40\n").unwrap().samples;
         assert_eq!(
             (samples[0].theta_i_deg, samples[0].rgb),
             (10.0, [1.0, 2.0, 3.0])

@@ -1,6 +1,6 @@
 //! Samples as `.npy`.
 
-use crate::format::{Content, Format, SampleFormat};
+use crate::format::{Content, Format, SampleFormat, SamplesRead};
 use crate::sample_rows::{frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, npy};
 use gonia_brdf::Sample;
@@ -19,7 +19,7 @@ pub(super) static FORMAT: Format = Format {
     content: Content::Samples(SampleFormat { read, write }),
 };
 
-fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
+fn read(path: &Path) -> Result<SamplesRead, FileError> {
     let mut array = npy::open(path, DTYPE, 4)?;
     let (n, columns) = match array.shape[..] {
         [n, columns @ (7 | 8)] => (n as usize, columns as usize),
@@ -51,7 +51,7 @@ fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
             samples.push(sample);
         }
     }
-    Ok(samples)
+    Ok(samples.into())
 }
 
 fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
@@ -143,7 +143,7 @@ mod tests {
         println!("write: {:?}", start.elapsed());
         drop(samples);
         let start = std::time::Instant::now();
-        let back = read_samples(&path).unwrap();
+        let back = read_samples(&path).unwrap().samples;
         println!("read: {:?} for {} rows", start.elapsed(), back.len());
         assert!(start.elapsed().as_secs_f64() < 1.5);
     }

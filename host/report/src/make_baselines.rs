@@ -27,7 +27,7 @@ pub fn make_baselines(
     progress: &Progress<'_>,
 ) -> Result<BaselineTable, Error> {
     let path = |name: &str| folder.join(name);
-    let samples = read_samples(&path(SAMPLES))?;
+    let samples = read_samples(&path(SAMPLES))?.samples;
     let dense = read_dense(&path(DENSE))?;
     let truth = match path(TRUTH).exists() {
         true => Some(read_dense(&path(TRUTH))?),

@@ -8,6 +8,7 @@
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
+//! | [`Remark`] | what is said of data that were used all the same |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
 
 mod bench_setup;
@@ -21,6 +22,7 @@ mod frame_row;
 mod genicam;
 mod homography;
 mod raw_frame;
+mod remark;
 mod rig;
 mod rig_error;
 mod sample_set;
@@ -39,6 +41,7 @@ pub use frame_row::{Exposure, FrameRow, Role};
 pub use genicam::{ExposureTiming, Genicam, PixelFormat};
 pub use homography::Homography;
 pub use raw_frame::RawFrame;
+pub use remark::Remark;
 pub use rig::{CameraGeometry, LightGeometry, Reference, ReflectanceTable, Rig, Sampling, Target};
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;

@@ -1,0 +1,10 @@
+//! Warnings on standard error.
+
+use gonia_rig::Remark;
+
+/// Prints what is to be said of data that are used all the same, a line each.
+pub fn print(remarks: &[Remark]) {
+    for remark in remarks {
+        eprintln!("warning: {}", gonia_formats::one_line(&remark.to_string()));
+    }
+}
