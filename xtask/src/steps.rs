@@ -11,15 +11,19 @@ const ARAVIS: [&str; 3] = ["libaravis-dev", "libusb-1.0-0-dev", "pkg-config"];
 
 /// All that a change must pass: what is quickest to fail comes first.
 pub fn test() -> Result<()> {
-    let root = root()?;
     let mut table = Table::default();
-    read_sources(&mut table, &root)?;
-    let features = genicam(&mut table);
-    compile(&mut table, &root, features)?;
-    run_tests(&mut table, &root, features)?;
-    fuzz_all(&mut table, &root, FUZZ_BRIEFLY_S)?;
+    let outcome = all(&mut table, &root()?);
+    // Where one failed, too: what came before it, and for how long.
     table.print();
-    Ok(())
+    outcome
+}
+
+fn all(table: &mut Table, root: &Path) -> Result<()> {
+    read_sources(table, root)?;
+    let features = genicam(table);
+    compile(table, root, features)?;
+    run_tests(table, root, features)?;
+    fuzz_all(table, root, FUZZ_BRIEFLY_S)
 }
 
 /// Which crate may use which, which file may import which, how long a function may be.
