@@ -16,7 +16,7 @@ const MATERIAL_SIGMAS: f64 = 1.5;
 
 /// Width of line and gap at a station, pixels.
 #[derive(Clone, Copy)]
-pub struct Profile {
+pub struct LineProfile {
     pub half_width: f64,
     /// From the centre of the line to the edge of the material.
     pub edge: f64,
@@ -42,7 +42,7 @@ pub struct StationFit {
     pub right: [f64; 2],
 }
 
-impl Profile {
+impl LineProfile {
     /// Fits a run whose line is `shift(sample)` from the predicted one. `None` with too few pixels.
     pub fn fit(&self, run: &[RunSample], shift: impl Fn(&RunSample) -> f64) -> Option<StationFit> {
         let margin = WINDOW_SIGMAS * self.sigma + 1.0;
@@ -204,7 +204,7 @@ fn normal(z: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    fn run(profile: &Profile, at: f64, amplitudes: [f64; 3]) -> Vec<RunSample> {
+    fn run(profile: &LineProfile, at: f64, amplitudes: [f64; 3]) -> Vec<RunSample> {
         (-12..=12)
             .map(|k| {
                 let t = f64::from(k) + 0.3;
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn a_hair_line_beside_a_brighter_material_is_placed_exactly() {
         // As at 400 px and θv = 75°: line 0.36 px thick, 1.2 px from the material.
-        let truth = Profile {
+        let truth = LineProfile {
             half_width: 0.18,
             edge: 1.35,
             sigma: 0.5,
@@ -231,7 +231,7 @@ mod tests {
         let run = run(&truth, 0.37, [0.25, 0.01, 0.4]);
         let (mut at, mut sigma) = (0.0, 0.6);
         for _ in 0..8 {
-            let fit = Profile { sigma, ..truth }.fit(&run, |_| at).unwrap();
+            let fit = LineProfile { sigma, ..truth }.fit(&run, |_| at).unwrap();
             let [a, b, c] = fit.normal;
             let det = a * c - b * b;
             at += (c * fit.right[0] - b * fit.right[1]) / det;
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_flat_run_gains_nothing_from_a_line() {
-        let profile = Profile {
+        let profile = LineProfile {
             half_width: 0.7,
             edge: 5.0,
             sigma: 0.5,

@@ -2,7 +2,7 @@
 
 use crate::hough::StripLine;
 use crate::lines::{LineStrip, RunSample, Station};
-use crate::profile::{Profile, StationFit};
+use crate::profile::{LineProfile, StationFit};
 use gonia_rig::Target;
 use nalgebra::{SMatrix, SVector};
 
@@ -199,7 +199,7 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
         .stations
         .iter()
         .filter_map(|station| {
-            let profile = Profile {
+            let profile = LineProfile {
                 half_width: 0.5 * target.line_width_mm * station.px_per_mm,
                 edge: (target.line_offset_mm - target.material_half_mm) * station.px_per_mm,
                 sigma,

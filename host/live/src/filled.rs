@@ -10,7 +10,7 @@ use gonia_rig::Rig;
 /// The bins of the paper's grid with a sample in them, and one slice of their values. The values are
 /// those under an ideal point light, relative: enough to see that something is wrong, and known
 /// before the session is over. A pose that is taken again counts twice in the slice's means.
-pub struct Filled {
+pub struct SeenBins {
     grid: Grid,
     points_mm: Vec<[f64; 2]>,
     light_m: f64,
@@ -22,7 +22,7 @@ pub struct Filled {
     slice: Slice,
 }
 
-impl Filled {
+impl SeenBins {
     /// None yet.
     pub fn new(rig: &Rig, plan: &[Pose]) -> Self {
         let grid = Grid::PAPER;
@@ -134,7 +134,7 @@ mod tests {
             })
             .collect();
         sampled.points[7] = Err(LeftOut::Occlusion);
-        let mut filled = Filled::new(&rig, &[pose]);
+        let mut filled = SeenBins::new(&rig, &[pose]);
         assert!(filled.add(&sampled));
 
         let samples: Vec<Sample> = grid

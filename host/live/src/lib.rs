@@ -12,7 +12,7 @@
 //! | `server` | [`LivePage`]: a thread that serves page, pictures, changes and orders |
 //! | `guard`, `page` | who may look and who may order; the document and its policy |
 
-mod board;
+mod dashboard;
 mod filled;
 mod guard;
 mod page;

@@ -1,6 +1,6 @@
 //! The server: a thread of its own, which only reads what the session's events have left on the board.
 
-use crate::board::Board;
+use crate::dashboard::Dashboard;
 use crate::guard::{Guard, random_hex};
 use crate::page;
 use crate::thumbnail::Thumbnail;
@@ -90,7 +90,7 @@ fn no_random_bits(error: getrandom::Error) -> LiveError {
 
 /// What the session and the server share.
 struct Shared {
-    board: Mutex<Board>,
+    board: Mutex<Dashboard>,
     orders: Orders,
     guard: Guard,
     nonce: String,
@@ -99,11 +99,11 @@ struct Shared {
 }
 
 impl Shared {
-    fn board(&self) -> MutexGuard<'_, Board> {
+    fn board(&self) -> MutexGuard<'_, Dashboard> {
         self.board.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self, change: impl FnOnce(&mut Board)) {
+    fn change(&self, change: impl FnOnce(&mut Dashboard)) {
         change(&mut self.board());
         self.version.send_replace(());
     }
@@ -137,7 +137,7 @@ impl LivePage {
         let folder = session.folder();
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         let title = name.to_string_lossy().into_owned();
-        let mut board = Board::new(title, session.rig(), session.plan(), session.roles());
+        let mut board = Dashboard::new(title, session.rig(), session.plan(), session.roles());
         for pose in session.done() {
             board.remember(&session.frame(pose)?);
         }
@@ -309,7 +309,7 @@ fn png(bytes: Vec<u8>) -> Response {
 
 async fn order(State(shared): Page, give: impl FnOnce(&Orders)) -> StatusCode {
     give(&shared.orders);
-    shared.change(Board::touch);
+    shared.change(Dashboard::touch);
     StatusCode::NO_CONTENT
 }
 

@@ -1,6 +1,6 @@
 //! A model of one's own, fitted to a dense BRDF: Minnaert's, for dark and dusty surfaces.
 
-use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, Range, Values};
+use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, ParameterValues, Range};
 use gonia_brdf::{Brdf, DenseBrdf, Grid, Vec3};
 use gonia_pipeline::fit::{cells_of_dense, fit_model};
 use gonia_pipeline::silent;
@@ -34,7 +34,7 @@ impl ModelFamily for MinnaertFamily {
         list
     }
 
-    fn model(&self, values: &Values) -> Option<Box<dyn Brdf>> {
+    fn model(&self, values: &ParameterValues) -> Option<Box<dyn Brdf>> {
         let (albedo, k) = (values.colour("albedo")?, values.get("k")?);
         Some(Box::new(Minnaert { albedo, k }))
     }

@@ -12,7 +12,7 @@ const MOVED_LIMIT_DEG: f64 = 0.2;
 
 /// A take of the control pose beside its first one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Comparison {
+pub struct ControlComparison {
     /// Median brightness over that of the first take.
     pub ratio: f64,
     /// Robust standard deviation of the points' own ratios about it.
@@ -32,7 +32,7 @@ pub enum Judgement {
     Moved,
 }
 
-impl Comparison {
+impl ControlComparison {
     /// Compares two takes; `None` when they have no point in common.
     pub fn of(first: &SampledFrame, now: &SampledFrame) -> Option<Self> {
         let mut ratios: Vec<f64> = first
@@ -69,7 +69,7 @@ impl Comparison {
     }
 }
 
-impl fmt::Display for Comparison {
+impl fmt::Display for ControlComparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -116,19 +116,19 @@ mod tests {
     #[test]
     fn a_darker_lamp_drifts_and_another_sample_has_moved() {
         let first = frame(|i| 1.0 + i as f32);
-        let same = Comparison::of(&first, &frame(|i| 1.001 * (1.0 + i as f32))).unwrap();
+        let same = ControlComparison::of(&first, &frame(|i| 1.001 * (1.0 + i as f32))).unwrap();
         assert_eq!(same.judge(0.02), Judgement::Same);
-        let darker = Comparison::of(&first, &frame(|i| 0.9 * (1.0 + i as f32))).unwrap();
+        let darker = ControlComparison::of(&first, &frame(|i| 0.9 * (1.0 + i as f32))).unwrap();
         assert!((darker.ratio - 0.9).abs() < 1e-6);
         assert_eq!(darker.judge(0.02), Judgement::Drifted);
-        let turned = Comparison::of(&first, &frame(|i| 102.0 - i as f32)).unwrap();
+        let turned = ControlComparison::of(&first, &frame(|i| 102.0 - i as f32)).unwrap();
         assert_eq!(turned.judge(0.02), Judgement::Moved);
         let mut shifted = first.clone();
         shifted.report.pose_offset.theta_deg += 0.3;
-        let moved = Comparison::of(&first, &shifted).unwrap();
+        let moved = ControlComparison::of(&first, &shifted).unwrap();
         assert_eq!(moved.judge(0.02), Judgement::Moved);
         let mut hidden = first.clone();
         hidden.points.fill(Err(LeftOut::Occlusion));
-        assert_eq!(Comparison::of(&first, &hidden), None);
+        assert_eq!(ControlComparison::of(&first, &hidden), None);
     }
 }

@@ -2,7 +2,7 @@
 //! samples and keeps them.
 
 use crate::camera::{Camera, CameraError, Pulse};
-use crate::capture::control::Comparison;
+use crate::capture::control::ControlComparison;
 use crate::capture::watch::{SessionEvent, Watch};
 use crate::session::{PoseDone, SessionWriter};
 use gonia_formats::FileError;
@@ -59,7 +59,7 @@ pub enum Fetched {
 /// A take of the control pose.
 pub enum ControlTake {
     /// How it compares with the first take.
-    Compared(Comparison),
+    Compared(ControlComparison),
     /// Its fiducial lines are not seen, or it has no point in common with the first take.
     Unusable,
 }
@@ -172,7 +172,7 @@ impl FrameWorker<'_> {
         let is_locked = sampled.report.outcome == Outcome::Locked;
         if taken.task.is_control {
             let first = self.baseline.as_ref().filter(|_| is_locked);
-            let comparison = first.and_then(|first| Comparison::of(first, sampled));
+            let comparison = first.and_then(|first| ControlComparison::of(first, sampled));
             return WorkerEvent::Control(
                 comparison.map_or(ControlTake::Unusable, ControlTake::Compared),
             );

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 /// \[θ, φ\] of one arm.
 pub type Axes = [f64; 2];
 /// Light arm and camera arm.
-pub type Pair = [Axes; 2];
+pub type ArmAngles = [Axes; 2];
 
 /// Polar angles at which one arm may pass the other.
 const PASSES_DEG: [f64; 7] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0];
@@ -22,14 +22,14 @@ const FINENESS_DEG: f64 = 0.5;
 const SLACK_DEG: f64 = 1e-6;
 
 /// The angle between the directions of two arms, degrees.
-pub fn apart_deg(pair: &Pair) -> f64 {
+pub fn apart_deg(pair: &ArmAngles) -> f64 {
     nearest_deg(pair, pair)
 }
 
 /// The legs of a way that is clear of `keep_out_deg`, the last one ending at `to`; `None` if there is
 /// none. Arms that stand nearer than that, as after homing, may part: the first legs come no nearer
 /// than they are.
-pub fn way(from: &Pair, to: &Pair, keep_out_deg: f64) -> Option<Vec<Pair>> {
+pub fn way(from: &ArmAngles, to: &ArmAngles, keep_out_deg: f64) -> Option<Vec<ArmAngles>> {
     if is_clear(from, to, keep_out_deg) {
         return Some(vec![*to]);
     }
@@ -63,8 +63,8 @@ pub fn way(from: &Pair, to: &Pair, keep_out_deg: f64) -> Option<Vec<Pair>> {
 fn trace(
     came_from: &[Option<[usize; 2]>],
     width: usize,
-    node: impl Fn([usize; 2]) -> Pair,
-) -> Vec<Pair> {
+    node: impl Fn([usize; 2]) -> ArmAngles,
+) -> Vec<ArmAngles> {
     let mut legs = Vec::new();
     let mut at = [1, 1];
     while at != [0, 0] {
@@ -90,7 +90,7 @@ fn stations_of(from: Axes, to: Axes) -> Vec<Axes> {
 
 /// Whether both arms may go at once, at whatever pace, each axis on its own. Where they stand too near
 /// already they may go no nearer, and must be clear at the end or at least further apart.
-fn is_clear(from: &Pair, to: &Pair, keep_out_deg: f64) -> bool {
+fn is_clear(from: &ArmAngles, to: &ArmAngles, keep_out_deg: f64) -> bool {
     let stand_deg = apart_deg(from);
     let nearest = nearest_deg(from, to);
     if stand_deg >= keep_out_deg {
@@ -100,13 +100,13 @@ fn is_clear(from: &Pair, to: &Pair, keep_out_deg: f64) -> bool {
     parts && nearest >= stand_deg - SLACK_DEG && !moves_both(from, to)
 }
 
-fn moves_both(from: &Pair, to: &Pair) -> bool {
+fn moves_both(from: &ArmAngles, to: &ArmAngles) -> bool {
     from[0] != to[0] && from[1] != to[1]
 }
 
 /// The smallest angle between any place that the light arm may be at on its way and any of the camera
 /// arm's, degrees: to about a fifth of a degree where both polar angles change.
-fn nearest_deg(from: &Pair, to: &Pair) -> f64 {
+fn nearest_deg(from: &ArmAngles, to: &ArmAngles) -> f64 {
     let [low, high] = [from[0][1] - from[1][1], to[0][1] - to[1][1]]
         .iter()
         .chain(&[from[0][1] - to[1][1], to[0][1] - from[1][1]])
@@ -150,13 +150,13 @@ mod tests {
     use gonia_brdf::Direction;
     use gonia_brdf::direction::angle_between;
 
-    fn angle_deg(pair: &Pair) -> f64 {
+    fn angle_deg(pair: &ArmAngles) -> f64 {
         let [a, b] = pair.map(|[theta, phi]| Direction::from_deg(theta, phi).to_vec3());
         angle_between(a, b).to_degrees()
     }
 
     /// Goes a leg at many paces; the smallest angle on the way.
-    fn nearest_of_many_paces(from: &Pair, to: &Pair) -> f64 {
+    fn nearest_of_many_paces(from: &ArmAngles, to: &ArmAngles) -> f64 {
         let at = |arm: usize, axis: usize, share: f64| {
             from[arm][axis] + share * (to[arm][axis] - from[arm][axis])
         };
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn no_pace_brings_the_arms_nearer_than_the_leg_says() {
-        let legs: [[Pair; 2]; 5] = [
+        let legs: [[ArmAngles; 2]; 5] = [
             [[[10.0, 0.0], [60.0, 90.0]], [[70.0, 60.0], [50.0, 110.0]]],
             [[[45.0, 350.0], [45.0, 30.0]], [[45.0, 330.0], [40.0, 20.0]]],
             [

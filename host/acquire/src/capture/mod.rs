@@ -30,7 +30,7 @@ mod unattended;
 mod watch;
 
 pub use arms::{Arms, BadExposures, HomeError, ShotOptions};
-pub use control::{Comparison, Judgement};
+pub use control::{ControlComparison, Judgement};
 pub use disk::free_mb;
 pub use equipment::{ArmPortNames, Equipment, EquipmentError, simulated_arms};
 pub use orders::Orders;

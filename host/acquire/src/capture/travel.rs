@@ -1,6 +1,6 @@
 //! A plan in the arms' own times, and kept clear of the other arm.
 
-use crate::capture::keep_out::{Pair, apart_deg, way};
+use crate::capture::keep_out::{ArmAngles, apart_deg, way};
 use crate::capture::timing::{SETTLE_TIME_S, move_time_s, nearest_turn_deg};
 use gonia_brdf::{Direction, Pose};
 use gonia_plan::{Plan, Rings};
@@ -39,7 +39,7 @@ pub fn keep_apart(plan: &mut Plan, keep_out_deg: f64) -> KeptApart {
     let (mut travel_s, mut rounds, mut out_of_reach) = (0.0, 0, 0);
     let limit_deg = |key: Key| f64::from(key.default_of(Axis::Phi)) * 1e-6;
     let limits_deg = [limit_deg(Key::SoftMin), limit_deg(Key::SoftMax)];
-    let mut at: Option<Pair> = None;
+    let mut at: Option<ArmAngles> = None;
     plan.poses.retain(|pose| {
         let Some(from) = at else {
             at = Some(axes(pose));
@@ -75,7 +75,7 @@ pub fn keep_apart(plan: &mut Plan, keep_out_deg: f64) -> KeptApart {
 }
 
 /// The slowest of four axes.
-fn leg_time_s(from: &Pair, to: &Pair) -> f64 {
+fn leg_time_s(from: &ArmAngles, to: &ArmAngles) -> f64 {
     from.iter()
         .zip(to)
         .flat_map(|(from, to)| {

@@ -29,10 +29,10 @@ pub const JOURNAL: &str = "journal.log";
 pub const FRAMES: &str = "frames.bin";
 
 /// Reference before material: the order in which a session measures them.
-pub type Key = (bool, usize);
+pub type PoseKey = (bool, usize);
 
 /// The place of a pose in a session's order.
-pub fn key(role: Role, index: usize) -> Key {
+pub fn key(role: Role, index: usize) -> PoseKey {
     (role == Role::Material, index)
 }
 
@@ -44,7 +44,7 @@ pub struct SessionFolder {
     plan: Vec<Pose>,
     provenance: SessionProvenance,
     pub(super) lines: Lines,
-    done: BTreeMap<Key, PoseDone>,
+    done: BTreeMap<PoseKey, PoseDone>,
 }
 
 impl SessionFolder {
@@ -239,8 +239,8 @@ fn poses_done(
     path: &Path,
     lines: &Lines,
     planned: usize,
-) -> Result<BTreeMap<Key, PoseDone>, FileError> {
-    let mut done: BTreeMap<Key, (usize, PoseDone)> = BTreeMap::new();
+) -> Result<BTreeMap<PoseKey, PoseDone>, FileError> {
+    let mut done: BTreeMap<PoseKey, (usize, PoseDone)> = BTreeMap::new();
     for (i, entry) in lines.entries.iter().enumerate() {
         let pose = match entry {
             Entry::Pose(pose) => pose,

@@ -1,6 +1,6 @@
 //! The bins nearest to a place, exactly.
 
-use super::settings::{BaselineSettings, Places, Values};
+use super::settings::{BaselineSettings, Places, Transform};
 use super::space::{Place, Space};
 use crate::bins::Bins;
 use crate::direction::Vec3;
@@ -56,7 +56,7 @@ pub(super) struct BinTree<'a> {
     bins: &'a Bins,
     space: Space,
     places: Places,
-    values: Values,
+    values: Transform,
     /// Smallest value that a logarithm is taken of.
     floor: [f32; 3],
     /// Unit vector of each direction of the grid.
@@ -162,8 +162,8 @@ impl<'a> BinTree<'a> {
     fn value_of(&self, site: Site) -> [f64; 3] {
         let bin = &self.bins.bins()[site.bin as usize];
         match self.values {
-            Values::Linear => bin.median.map(f64::from),
-            Values::Logarithm => {
+            Transform::Linear => bin.median.map(f64::from),
+            Transform::Logarithm => {
                 [0, 1, 2].map(|c| self.bins.log_value(bin, c, self.floor[c]).into())
             }
         }

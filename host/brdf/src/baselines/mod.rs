@@ -25,7 +25,7 @@ pub use basis::BasisFunction;
 pub use bin_tree::Neighbourhood;
 pub use fill::{BaselineFill, BaselineFiller, Tally, fill, n_interpolated};
 pub use predict::{Predictor, Workspace};
-pub use settings::{BaselineSettings, Places, Rule, UnknownBaseline, Values};
+pub use settings::{BaselineSettings, Places, Rule, Transform, UnknownBaseline};
 pub use space::Space;
 pub use system::System;
 

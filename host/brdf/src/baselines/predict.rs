@@ -1,7 +1,7 @@
 //! Values at any pair of directions, one at a time.
 
 use super::bin_tree::{BinTree, Neighbourhood};
-use super::settings::{BaselineSettings, Values};
+use super::settings::{BaselineSettings, Transform};
 use super::system::System;
 use super::{Failure, Interpolant};
 use crate::bins::Bins;
@@ -73,9 +73,9 @@ impl<'a> Predictor<'a> {
             .gather(light, view, self.settings.neighbours, &mut work.near);
         let value = self.interpolant.estimate(&work.near, &mut work.system)?;
         let value = match self.settings.values {
-            Values::Linear => value,
+            Transform::Linear => value,
             // A NaN stays one.
-            Values::Logarithm => value.map(|v| v.clamp(-LOG_LIMIT, LOG_LIMIT).exp()),
+            Transform::Logarithm => value.map(|v| v.clamp(-LOG_LIMIT, LOG_LIMIT).exp()),
         };
         // As the single-precision number that it will be.
         if value.iter().all(|v| (*v as f32).is_finite()) {
@@ -90,8 +90,8 @@ impl<'a> Predictor<'a> {
         self.tree.gather(light, view, 1, &mut work.near);
         let value = work.near.values.first().copied().unwrap_or_default();
         match self.settings.values {
-            Values::Linear => value,
-            Values::Logarithm => value.map(f64::exp),
+            Transform::Linear => value,
+            Transform::Logarithm => value.map(f64::exp),
         }
     }
 }

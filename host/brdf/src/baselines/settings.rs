@@ -46,10 +46,10 @@ pub enum Places {
     Means,
 }
 
-/// What is interpolated.
+/// What is interpolated: the values, or a function of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Values {
-    /// The values, as in the paper.
+pub enum Transform {
+    /// The values themselves, as in the paper.
     Linear,
     /// Their logarithms.
     Logarithm,
@@ -65,7 +65,7 @@ pub struct BaselineSettings {
     /// Where distances are taken.
     pub space: Space,
     /// What is interpolated.
-    pub values: Values,
+    pub values: Transform,
     /// Where a bin's value belongs.
     pub places: Places,
     /// Whether every bin stands at its reciprocal place too. Without it values are made
@@ -98,7 +98,7 @@ impl BaselineSettings {
         },
         neighbours: 200,
         space: Space::Chords,
-        values: Values::Linear,
+        values: Transform::Linear,
         places: Places::Centres,
         mirrored: false,
         nugget: 1e-3,
@@ -145,8 +145,8 @@ impl BaselineSettings {
                 let weight = positive()?;
                 self.space = Space::Symmetric(Coordinates::sum_difference(weight));
             }
-            ("linear", "") => self.values = Values::Linear,
-            ("log", "") => self.values = Values::Logarithm,
+            ("linear", "") => self.values = Transform::Linear,
+            ("log", "") => self.values = Transform::Logarithm,
             ("centres", "") => self.places = Places::Centres,
             ("means", "") => self.places = Places::Means,
             ("mirrored", "") => self.mirrored = true,
@@ -233,7 +233,7 @@ impl fmt::Display for BaselineSettings {
         if self.space != usual.space {
             write!(f, ",{}", self.space)?;
         }
-        if self.values == Values::Logarithm {
+        if self.values == Transform::Logarithm {
             f.write_str(",log")?;
         }
         if self.places == Places::Means {

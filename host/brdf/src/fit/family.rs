@@ -11,7 +11,7 @@ use std::sync::Arc;
 ///
 /// ```
 /// use gonia_brdf::progress::silent;
-/// use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, Range, Values, draw, fit};
+/// use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, Range, ParameterValues, draw, fit};
 /// use gonia_brdf::{Brdf, DenseBrdf, Grid, Vec3};
 ///
 /// /// Minnaert's model of dark surfaces: ρ/π (cos θi cos θv)^(k − 1).
@@ -38,7 +38,7 @@ use std::sync::Arc;
 ///         list
 ///     }
 ///
-///     fn model(&self, values: &Values) -> Option<Box<dyn Brdf>> {
+///     fn model(&self, values: &ParameterValues) -> Option<Box<dyn Brdf>> {
 ///         let (albedo, k) = (values.colour("albedo")?, values.get("k")?);
 ///         Some(Box::new(Minnaert { albedo, k }))
 ///     }
@@ -56,20 +56,20 @@ pub trait ModelFamily: Send + Sync {
     fn parameters(&self) -> Vec<Parameter>;
 
     /// The model of some values. `None` where a parameter is missing.
-    fn model(&self, values: &Values) -> Option<Box<dyn Brdf>>;
+    fn model(&self, values: &ParameterValues) -> Option<Box<dyn Brdf>>;
 
     /// Adjusts values that were drawn, each by itself, for a search to start from. As they are unless the
     /// family knows better.
-    fn adjust_start(&self, _values: &mut Values, _random: &mut Random) {}
+    fn adjust_start(&self, _values: &mut ParameterValues, _random: &mut Random) {}
 
     /// Of the many lists of values that are the same model, one. As they are unless the family says so.
-    fn canonical(&self, values: Values) -> Values {
+    fn canonical(&self, values: ParameterValues) -> ParameterValues {
         values
     }
 
     /// Numbers with the names of the parameters; `None` where they are not as many.
-    fn values(&self, numbers: Vec<f64>) -> Option<Values> {
-        Values::new(&self.parameters(), numbers)
+    fn values(&self, numbers: Vec<f64>) -> Option<ParameterValues> {
+        ParameterValues::new(&self.parameters(), numbers)
     }
 }
 
@@ -126,12 +126,12 @@ const CHANNELS: [&str; 3] = ["r", "g", "b"];
 
 /// Values of a family's parameters, in their order and by their names.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Values {
+pub struct ParameterValues {
     names: Arc<[String]>,
     numbers: Vec<f64>,
 }
 
-impl Values {
+impl ParameterValues {
     /// Numbers for parameters; `None` where they are not as many.
     pub fn new(parameters: &[Parameter], numbers: Vec<f64>) -> Option<Self> {
         let names = parameters.iter().map(|p| p.name.clone()).collect();
@@ -175,7 +175,7 @@ impl Values {
     }
 }
 
-impl Deref for Values {
+impl Deref for ParameterValues {
     type Target = [f64];
 
     fn deref(&self) -> &[f64] {

@@ -13,7 +13,7 @@ mod standard;
 mod uncertainty;
 
 pub use cells::{Cell, draw, draw_measured};
-pub use family::{ModelFamily, Parameter, Values};
+pub use family::{ModelFamily, Parameter, ParameterValues};
 pub use range::Range;
 pub use standard::{StandardFamily, UnknownFamily};
 
@@ -67,7 +67,7 @@ pub struct FittedModel<F = StandardFamily> {
     /// The kind of model.
     pub family: F,
     /// The values of its parameters, in their canonical form.
-    pub values: Values,
+    pub values: ParameterValues,
     /// The standard uncertainty of each, in the same order, from how much residuals vary together over
     /// patches of 30°; `None` where the data do not determine the number.
     pub uncertainties: Vec<Option<f64>>,
@@ -202,7 +202,7 @@ struct Problem<'a> {
     family: &'a dyn ModelFamily,
     parameters: Vec<Parameter>,
     /// Values with the parameters' names.
-    named: Values,
+    named: ParameterValues,
     loss: Loss,
     /// The mean of the values.
     mean: f64,
@@ -219,7 +219,7 @@ impl<'a> Problem<'a> {
         }
         let parameters = family.parameters();
         let middles = parameters.iter().map(|p| p.range.at_share(0.5)).collect();
-        let named = Values::new(&parameters, middles).ok_or(FitError::NoModel)?;
+        let named = ParameterValues::new(&parameters, middles).ok_or(FitError::NoModel)?;
         family.model(&named).ok_or(FitError::NoModel)?;
         // Dark and bright cells alternate, so that any first part is a fair sample.
         let half = cells.len().div_ceil(2);
@@ -265,7 +265,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A random place to start from.
-    fn start(&self, random: &mut Random) -> Values {
+    fn start(&self, random: &mut Random) -> ParameterValues {
         let drawn: Vec<f64> = self.parameters.iter().map(|p| p.draw(random)).collect();
         let mut values = self.named.with(&drawn);
         self.family.adjust_start(&mut values, random);

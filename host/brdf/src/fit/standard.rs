@@ -1,6 +1,6 @@
 //! The families of this crate's own models.
 
-use super::family::{ModelFamily, Parameter, Values};
+use super::family::{ModelFamily, Parameter, ParameterValues};
 use super::range::Range;
 use crate::direction::Vec3;
 use crate::model::{Brdf, Ggx, Kurt, KurtLobe, Lambert, Microcylinder, Reciprocal, Thread, Ward};
@@ -115,7 +115,7 @@ impl ModelFamily for StandardFamily {
         }
     }
 
-    fn model(&self, values: &Values) -> Option<Box<dyn Brdf>> {
+    fn model(&self, values: &ParameterValues) -> Option<Box<dyn Brdf>> {
         Some(match *self {
             StandardFamily::Lambert => Box::new(Lambert {
                 albedo: values.colour("diffuse")?,
@@ -154,7 +154,7 @@ impl ModelFamily for StandardFamily {
     }
 
     /// A second thread mostly lies across the first.
-    fn adjust_start(&self, values: &mut Values, random: &mut Random) {
+    fn adjust_start(&self, values: &mut ParameterValues, random: &mut Random) {
         let has_two = match *self {
             StandardFamily::Kurt { lobes } => lobes > 1,
             StandardFamily::Sadeghi { .. } => true,
@@ -169,7 +169,7 @@ impl ModelFamily for StandardFamily {
     }
 
     /// The narrow axis of a lobe first, azimuths in 0 .. 180, the strongest lobe or thread first.
-    fn canonical(&self, mut values: Values) -> Values {
+    fn canonical(&self, mut values: ParameterValues) -> ParameterValues {
         match *self {
             StandardFamily::Lambert => {}
             StandardFamily::Ggx | StandardFamily::Ward => {
@@ -216,14 +216,14 @@ impl ModelFamily for StandardFamily {
 }
 
 /// An azimuth in 0 .. 180 degrees.
-fn half_turn(values: &mut Values, azimuth: &str) {
+fn half_turn(values: &mut ParameterValues, azimuth: &str) {
     if let Some(value) = values.get(azimuth) {
         values.set(azimuth, value.rem_euclid(180.0));
     }
 }
 
 /// The smaller roughness first: the other one lies across it.
-fn narrow_axis_first(values: &mut Values, x: &str, y: &str, azimuth: &str) {
+fn narrow_axis_first(values: &mut ParameterValues, x: &str, y: &str, azimuth: &str) {
     if values.get(x) > values.get(y) {
         values.swap(x, y);
         if let Some(value) = values.get(azimuth) {
@@ -234,7 +234,7 @@ fn narrow_axis_first(values: &mut Values, x: &str, y: &str, azimuth: &str) {
 }
 
 /// Lobe number `k` of Kurt's model.
-fn lobe(values: &Values, k: usize) -> Option<KurtLobe> {
+fn lobe(values: &ParameterValues, k: usize) -> Option<KurtLobe> {
     let get = |name: &str| values.get(&format!("{name}{k}"));
     Some(KurtLobe {
         specular: values.colour(&format!("specular{k}"))?,
@@ -247,7 +247,7 @@ fn lobe(values: &Values, k: usize) -> Option<KurtLobe> {
 }
 
 /// Thread number `k` of the microcylinder model.
-fn thread(values: &Values, k: usize, cover: f64) -> Option<Thread> {
+fn thread(values: &ParameterValues, k: usize, cover: f64) -> Option<Thread> {
     let get = |name: &str| values.get(&format!("{name}{k}"));
     let tilt = get("tilt")?;
     Some(Thread {
@@ -343,7 +343,7 @@ mod tests {
 
     const ALL: [&str; 6] = ["lambert", "ggx", "ward", "kurt1", "kurt2", "sadeghi"];
 
-    fn start(family: StandardFamily, seed: u64) -> Values {
+    fn start(family: StandardFamily, seed: u64) -> ParameterValues {
         let mut random = Random::new(seed);
         let drawn = family
             .parameters()
@@ -370,7 +370,7 @@ mod tests {
                 assert_eq!(family.values(start[1..].to_vec()), None);
                 let mut other = family.parameters();
                 other[0].name = "another".to_owned();
-                let without = Values::new(&other, start.to_vec()).unwrap();
+                let without = ParameterValues::new(&other, start.to_vec()).unwrap();
                 assert!(family.model(&without).is_none());
             }
         }

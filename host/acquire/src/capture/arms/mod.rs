@@ -4,7 +4,7 @@ mod recovery;
 mod trigger;
 
 use crate::capture::keep_out;
-use crate::capture::keep_out::Pair;
+use crate::capture::keep_out::ArmAngles;
 use crate::capture::timing::nearest_turn_deg;
 use crate::link::{HEARTBEAT_US, LinkError, RemoteController, Ticket, Transport, is_uncalibrated};
 use gonia_brdf::Pose;
@@ -274,7 +274,7 @@ impl Arms {
             return Some(vec![targets_udeg]);
         }
         let deg = |pair: [[i32; 2]; 2]| pair.map(|axes| axes.map(|udeg| f64::from(udeg) * 1e-6));
-        let udeg = |pair: Pair| pair.map(|axes| axes.map(|deg| (deg * 1e6).round() as i32));
+        let udeg = |pair: ArmAngles| pair.map(|axes| axes.map(|deg| (deg * 1e6).round() as i32));
         let legs = keep_out::way(&deg(self.at_udeg), &deg(targets_udeg), self.keep_out_deg)?;
         Some(legs.into_iter().map(udeg).collect())
     }

@@ -1,6 +1,6 @@
 //! All that the page shows, and what of it has changed since a browser last asked.
 
-use crate::filled::Filled;
+use crate::filled::SeenBins;
 use crate::slice::Slice;
 use crate::thumbnail::Thumbnail;
 use gonia_acquire::capture::{POINTING_LIMIT_DEG, Pace, SessionEvent};
@@ -55,7 +55,7 @@ struct LastFrame {
 }
 
 /// What the page shows.
-pub struct Board {
+pub struct Dashboard {
     title: String,
     plan: Vec<Pose>,
     roles: &'static [Role],
@@ -68,7 +68,7 @@ pub struct Board {
     pace: Pace,
     last_deg: f64,
     worst_deg: f64,
-    filled: Filled,
+    filled: SeenBins,
     slice_version: u64,
     thumbnail: Option<Thumbnail>,
     drawn: Option<Instant>,
@@ -124,7 +124,7 @@ struct SliceNote {
     filled: f64,
 }
 
-impl Board {
+impl Dashboard {
     /// Of a session of that name over a plan.
     pub fn new(title: String, rig: &Rig, plan: &[Pose], roles: &'static [Role]) -> Self {
         Self {
@@ -138,7 +138,7 @@ impl Board {
             pace: Pace::new(plan.len(), roles.len()),
             last_deg: 0.0,
             worst_deg: 0.0,
-            filled: Filled::new(rig, plan),
+            filled: SeenBins::new(rig, plan),
             slice_version: 0,
             thumbnail: None,
             drawn: None,
@@ -374,13 +374,13 @@ mod tests {
         }
     }
 
-    fn board() -> Board {
+    fn board() -> Dashboard {
         let pose = |k: usize| Pose {
             light: Direction::from_deg(15.0, 10.0 * k as f64),
             view: Direction::from_deg(30.0, 0.0),
         };
         let plan: Vec<Pose> = (0..5).map(pose).collect();
-        let mut board = Board::new(
+        let mut board = Dashboard::new(
             "silk".into(),
             &Rig::paper(100),
             &plan,
@@ -394,7 +394,7 @@ mod tests {
         board
     }
 
-    fn done(board: &mut Board, index: u32, outcome: Outcome) {
+    fn done(board: &mut Dashboard, index: u32, outcome: Outcome) {
         let mut frame = some_frame(index, Role::Reference);
         frame.report.outcome = outcome;
         let done = PoseDone {
@@ -411,7 +411,7 @@ mod tests {
         });
     }
 
-    fn update(board: &Board, since: u64) -> (u64, Value) {
+    fn update(board: &Dashboard, since: u64) -> (u64, Value) {
         let (version, text) = board.update(since, false, false);
         (version, serde_json::from_str(&text).unwrap())
     }
