@@ -1,5 +1,6 @@
 //! A rig whose encoders sit 0.05° off their axes and were calibrated at the bench.
 
+use gonia_brdf::Elementary;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -93,7 +94,7 @@ fn calibrate(rig: &SimRig, arm: Arm, controller: &mut RemoteController) {
         let mut n = 0.0;
         let mut autocollimator = |_: &mut RemoteController, _| {
             n += 1.0;
-            let scatter = AUTOCOLLIMATOR_DEG * f64::sin(n * 2.4);
+            let scatter = AUTOCOLLIMATOR_DEG * f64::sine(n * 2.4);
             Ok(rig.true_deg(arm)[axis.index()] + scatter)
         };
         let found = calibrate_axis(controller, axis, &stands, true, &mut autocollimator);

@@ -7,6 +7,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use gonia_brdf::Elementary;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -337,7 +338,7 @@ fn apart_deg(i: Direction, v: Direction) -> f64 {
 fn half_deg(i: Direction, v: Direction) -> f64 {
     let (i, v) = (i.to_vec3(), v.to_vec3());
     let h = normalize([i[0] + v[0], i[1] + v[1], i[2] + v[2]]);
-    h[2].min(1.0).acos().to_degrees()
+    h[2].min(1.0).arc_cosine().to_degrees()
 }
 
 /// Cells of the case that have neither a bin nor a mirror with one, spread over them.
@@ -377,7 +378,9 @@ fn log_rms(row: &Row, places: &[(usize, usize)], values: &[[f64; 3]], floor: [f3
         let at = |d: &usize| grid().direction(*d).to_vec3();
         let truth = row.truth.eval(at(light), at(view));
         for c in 0..3 {
-            sum += (value[c].max(floor[c].into()) / truth[c]).ln().powi(2);
+            sum += (value[c].max(floor[c].into()) / truth[c])
+                .natural_log()
+                .powi(2);
         }
     }
     (sum / (3 * places.len()) as f64).sqrt()
@@ -494,7 +497,7 @@ impl std::fmt::Display for Verdict {
         match self.condition {
             // Beyond the precision of the numbers it has no digits.
             Some(condition) if condition > 1e15 => f.write_str("; ∞")?,
-            Some(condition) => write!(f, "; 1e{}", condition.log10().round())?,
+            Some(condition) => write!(f, "; 1e{}", condition.decimal_log().round())?,
             None => {}
         }
         if self.failed > 0.0 {
@@ -517,7 +520,7 @@ fn alike(written: &str, made: &str) -> Result<(), String> {
     for (a, b) in a.iter().zip(&b) {
         let number = |word: &str| word.trim_end_matches(';').parse::<f64>().ok();
         let same = match (number(a), number(b)) {
-            (Some(x), Some(y)) if b.starts_with("1e") => (x / y).log10().abs() < 1.5,
+            (Some(x), Some(y)) if b.starts_with("1e") => (x / y).decimal_log().abs() < 1.5,
             (Some(x), Some(y)) if y.fract() == 0.0 && y > 0.0 => (x - y).abs() < 3.5,
             (Some(x), Some(y)) => (x - y).abs() <= 0.1 * y.abs() + 0.001,
             _ => a == b,
@@ -645,7 +648,7 @@ struct SixDecades;
 impl Brdf for SixDecades {
     fn eval(&self, i: Vec3, v: Vec3) -> [f64; 3] {
         let h = normalize([i[0] + v[0], i[1] + v[1], i[2] + v[2]]);
-        [10f64.powf(-6.0 * (1.0 - h[2] * h[2])); 3]
+        [10f64.power(-6.0 * (1.0 - h[2] * h[2])); 3]
     }
 }
 
@@ -653,7 +656,7 @@ impl Brdf for SixDecades {
 struct RetroReflector;
 impl Brdf for RetroReflector {
     fn eval(&self, i: Vec3, v: Vec3) -> [f64; 3] {
-        let apart = dot(i, v).min(1.0).acos() / 15f64.to_radians();
-        [0.1 + 0.9 * (-apart * apart).exp(); 3]
+        let apart = dot(i, v).min(1.0).arc_cosine() / 15f64.to_radians();
+        [0.1 + 0.9 * (-apart * apart).exponential(); 3]
     }
 }

@@ -91,12 +91,6 @@ fn compile(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
             .args(features)
             .args(["--", "-D", "warnings"]))
     })?;
-    if !features.is_empty() {
-        // As most people build it. The tests are the same with and without, and have been looked at.
-        table.step("clippy without GenICam", || {
-            run(cargo(root).args(["clippy", "--workspace", "--", "-D", "warnings"]))
-        })?;
-    }
     systems::check(table, root)?;
     table.step("targets of the boards", || boards::add_boards_targets(root))?;
     table.step("boards", || boards::build_all(root))?;

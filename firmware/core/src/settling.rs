@@ -135,6 +135,8 @@ mod tests {
         assert_eq!((t, verdict), (190_000, SettlingResult::Reached));
     }
 
+    // Far from a limit: the last bit does not matter.
+    #[allow(clippy::disallowed_methods)]
     #[test]
     fn ringing_that_dies_down_needs_no_correction() {
         let (t, verdict) = watch(|t| (20_000.0 * (-(t as f64) / 50_000.0).exp()) as i32);

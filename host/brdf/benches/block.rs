@@ -3,6 +3,7 @@
 //!
 //! `cargo bench -p gonia-brdf --bench block` prints a table, a row for each number of data.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::interpolate::Matern32;
 use gonia_brdf::interpolate::block::{Block, BlockSettings, KrigingBlock};
 use gonia_brdf::interpolate::coordinates::Drift;
@@ -42,7 +43,7 @@ fn datum(k: usize, size: f32) -> Datum {
     // Powers of the root of x⁷ = x + 1: a low-discrepancy sequence in six dimensions.
     let point = [0.8986, 0.8075, 0.7257, 0.6521, 0.5860, 0.5266]
         .map(|a: f64| (2.0 * (k as f64 * a).fract() - 1.0) as f32 * size);
-    let value = (3.0 * point[0]).sin() + point[1] * point[2];
+    let value = (3.0 * point[0]).sine() + point[1] * point[2];
     Datum {
         point,
         log_value: [value, 2.0 * value, -value],

@@ -8,6 +8,7 @@
 
 mod plan;
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::Vec3;
 use gonia_brdf::interpolate::cross_validation::Fold;
 use gonia_brdf::interpolate::patches::cover;
@@ -29,7 +30,7 @@ struct Shares([[f64; 2]; 2]);
 
 impl Shares {
     fn add(&mut self, light: Vec3, view: Vec3, weight: f64, is_within: bool) {
-        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cos();
+        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
         let [within, all] = &mut self.0[usize::from(grazing)];
         *within += weight * f64::from(u8::from(is_within));
         *all += weight;
@@ -120,7 +121,7 @@ fn truths(
             let truth = model.eval(light, view);
             let measured = origins[cell] <= Origin::Reciprocal as u8;
             for c in 0..3 {
-                let off = (f64::from(log[c]) - truth[c].ln()).abs();
+                let off = (f64::from(log[c]) - truth[c].natural_log()).abs();
                 let is_within = off <= 1.96 * f64::from(error[c]);
                 shares[usize::from(measured)].add(light, view, 1.0, is_within);
             }

@@ -16,6 +16,7 @@
 
 mod plan;
 
+use gonia_brdf::Elementary;
 use gonia_brdf::interpolate::cross_validation::Fold;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::{
@@ -165,7 +166,7 @@ fn bends(dense: &gonia_brdf::DenseBrdf, settings: &FillSettings, model: &dyn Brd
             let off: Vec<f64> = (0..n)
                 .map(|view| {
                     let truth = model.eval(vectors[light], vectors[view])[1];
-                    (f64::from(dense.at(light, view)[1]) / truth).ln()
+                    (f64::from(dense.at(light, view)[1]) / truth).natural_log()
                 })
                 .collect();
             // By axis and row; across borders, and inside.
@@ -220,7 +221,7 @@ fn errors(data: &Data, settings: &FillSettings, model: &dyn Brdf) {
         let (mut inside, mut all) = (0, 0);
         for p in &predictions {
             let (i, v) = (p.bin.light.map(f64::from), p.bin.view.map(f64::from));
-            let deg = |d: [f64; 3]| d[2].acos().to_degrees();
+            let deg = |d: [f64; 3]| d[2].arc_cosine().to_degrees();
             if keep(deg(i), deg(v), f64::from(p.bin.median[1]) * i[2] * v[2]) {
                 for covered in calibration.covers(p) {
                     inside += usize::from(covered);
@@ -255,7 +256,7 @@ fn errors(data: &Data, settings: &FillSettings, model: &dyn Brdf) {
             let row = &mut count[usize::from(bars.origin[cell])];
             for c in 0..3 {
                 let relative = f64::from(bars.standard_error[c][cell] / value[c]);
-                let off = (f64::from(value[c]) / truth[c]).ln().abs();
+                let off = (f64::from(value[c]) / truth[c]).natural_log().abs();
                 row[0] += usize::from(off <= 1.96 * relative);
                 row[1] += 1;
             }
@@ -288,7 +289,7 @@ fn log_rms(
                     let truth = model.eval(i.to_vec3(), v.to_vec3());
                     let value = dense.at(light, view);
                     for c in 0..3 {
-                        sum += (f64::from(value[c]) / truth[c]).ln().powi(2);
+                        sum += (f64::from(value[c]) / truth[c]).natural_log().powi(2);
                         count += 1;
                     }
                 }

@@ -1,5 +1,7 @@
 //! Directions on the hemisphere above the sample.
 
+use crate::elementary::Elementary;
+
 /// A vector in the sample's frame: x, y in its plane, z along its normal.
 pub type Vec3 = [f64; 3];
 
@@ -23,22 +25,22 @@ impl Direction {
 
     /// From any non-zero vector; at the pole φ is 0.
     pub fn from_vec3(v: Vec3) -> Self {
-        let in_plane = v[0].hypot(v[1]);
+        let in_plane = v[0].hypotenuse(v[1]);
         let phi = if in_plane < 1e-12 * v[2].abs() {
             0.0
         } else {
-            v[1].atan2(v[0]).rem_euclid(std::f64::consts::TAU)
+            v[1].arc_tangent2(v[0]).rem_euclid(std::f64::consts::TAU)
         };
         Self {
-            theta: in_plane.atan2(v[2]),
+            theta: in_plane.arc_tangent2(v[2]),
             phi,
         }
     }
 
     /// The unit vector `(sin θ cos φ, sin θ sin φ, cos θ)`.
     pub fn to_vec3(self) -> Vec3 {
-        let (st, ct) = self.theta.sin_cos();
-        let (sp, cp) = self.phi.sin_cos();
+        let (st, ct) = self.theta.sine_cosine();
+        let (sp, cp) = self.phi.sine_cosine();
         [st * cp, st * sp, ct]
     }
 
@@ -108,7 +110,7 @@ pub fn normalize(v: Vec3) -> Vec3 {
 /// The angle between two unit vectors, in radians; exact for small angles too.
 pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
     let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    2.0 * (0.5 * dot(d, d).sqrt()).min(1.0).asin()
+    2.0 * (0.5 * dot(d, d).sqrt()).min(1.0).arc_sine()
 }
 
 #[cfg(test)]

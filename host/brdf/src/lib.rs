@@ -32,6 +32,7 @@
 //! | [`baselines`] | the paper's method and other known ones, one cell at a time |
 //! | [`dense`] | a BRDF at every pair of directions of a grid |
 //! | [`model`], [`fit`] | analytic models; their parameters, fitted to a table or to bins |
+//! | [`Elementary`] | sine, logarithm and the like, with the same bits on every system |
 //! | [`progress`] | what a caller hears of work that takes long |
 //! | [`quantile`], [`random`] | medians; random numbers that are the same everywhere |
 //!
@@ -42,6 +43,7 @@ pub mod baselines;
 pub mod bins;
 pub mod dense;
 pub mod direction;
+mod elementary;
 pub mod fit;
 pub mod grid;
 pub mod hemisphere;
@@ -55,6 +57,7 @@ pub mod sample;
 pub use bins::{Bin, Bins};
 pub use dense::DenseBrdf;
 pub use direction::{Direction, Pose, Vec3};
+pub use elementary::Elementary;
 pub use grid::Grid;
 pub use model::Brdf;
 pub use sample::Sample;

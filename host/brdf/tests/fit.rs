@@ -5,7 +5,7 @@
 
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::fit::{
-    Cell, FitSettings, FittedModel, ModelFamily, Range, StandardFamily, Values, draw,
+    Cell, FitSettings, FittedModel, ModelFamily, ParameterValues, Range, StandardFamily, draw,
     draw_measured, fit,
 };
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
@@ -40,7 +40,7 @@ fn noisy(model: &dyn Brdf, grid: Grid) -> DenseBrdf {
 struct Case {
     name: &'static str,
     family: StandardFamily,
-    truth: Values,
+    truth: ParameterValues,
 }
 
 fn case(name: &'static str, family: &str, truth: &[f64]) -> Case {

@@ -1,5 +1,6 @@
 //! What the interpolation owes to any material, on a plan of some hundred frames.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, local_direction};
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate::cross_validation::Fold;
@@ -58,7 +59,7 @@ fn broad() -> Kurt {
 }
 
 fn angles(bin_light: [f32; 3], bin_view: [f32; 3]) -> (f64, f64) {
-    let deg = |d: [f32; 3]| f64::from(d[2]).min(1.0).acos().to_degrees();
+    let deg = |d: [f32; 3]| f64::from(d[2]).min(1.0).arc_cosine().to_degrees();
     (deg(bin_light), deg(bin_view))
 }
 
@@ -164,11 +165,11 @@ fn true_values_lie_within_the_error_bars_of_their_cells() {
                 let (log, variance) = (solved.cells[k], solved.variances[k]);
                 let error = calibration.standard_error(light, view, log, variance);
                 let truth = model.eval(light, view);
-                let is_grazing = light[2].min(view[2]) < 75f64.to_radians().cos();
+                let is_grazing = light[2].min(view[2]) < 75f64.to_radians().cosine();
                 let is_measured = origin != Origin::Interpolated as u8;
                 let strata = [true, !is_grazing, is_grazing, is_measured];
                 for c in 0..3 {
-                    let off = (f64::from(log[c]) - truth[c].ln()).abs();
+                    let off = (f64::from(log[c]) - truth[c].natural_log()).abs();
                     let inside = off <= 1.96 * f64::from(error[c]);
                     for (share, _) in shares.iter_mut().zip(strata).filter(|(_, is_in)| *is_in) {
                         share[0] += f64::from(u8::from(inside));
@@ -347,7 +348,7 @@ fn interior_error(dense: &DenseBrdf, model: &dyn Brdf) -> f64 {
         .map(|(light, view)| {
             let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
             (f64::from(dense.at(light, view)[1]) / model.eval(i, v)[1])
-                .ln()
+                .natural_log()
                 .powi(2)
         })
         .collect();
@@ -388,7 +389,7 @@ fn bends(dense: &DenseBrdf, model: &dyn Brdf, block_deg: f64) -> (f64, f64) {
     }
     let off = |light: usize, view: usize| {
         let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
-        (f64::from(dense.at(light, view)[1]) / model.eval(i, v)[1]).ln()
+        (f64::from(dense.at(light, view)[1]) / model.eval(i, v)[1]).natural_log()
     };
     let interior = |d: usize| grid.direction(d).theta_deg() <= 75.0;
     // Rows of one row of blocks count as one.
@@ -477,8 +478,8 @@ impl Kernel for Written {
     }
     fn correlation(&self, s: f32) -> f32 {
         match self {
-            Written::Matern32 => (1.0 + s) * (-s).exp(),
-            Written::Matern52 => (1.0 + s + s * s / 3.0) * (-s).exp(),
+            Written::Matern32 => (1.0 + s) * (-s).exponential(),
+            Written::Matern52 => (1.0 + s + s * s / 3.0) * (-s).exponential(),
         }
     }
 }

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::baselines::{BaselineSettings, BasisFunction, Predictor, Rule, Workspace};
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{Bins, Direction, Grid, Sample};
@@ -69,7 +70,7 @@ fn bins() -> Bins {
 
 fn value(i: Vec3, v: Vec3) -> [f64; 3] {
     let d = [i[0] + v[0], i[1] + v[1], i[2] + v[2] - 1.2];
-    let lobe = (-3.0 * dot(d, d)).exp();
+    let lobe = (-3.0 * dot(d, d)).exponential();
     [0.5 + lobe, 1.0 + 0.3 * i[0] * v[1], 0.2 + lobe * i[2]]
 }
 

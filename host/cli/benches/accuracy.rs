@@ -6,6 +6,7 @@
 
 #![allow(clippy::expect_used)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{angle_between, local_direction};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
@@ -108,7 +109,7 @@ fn errors(scene: &Scene, rig: &Rig, truth: Pose, shot: u64) -> Vec<SampleError> 
         .expect("a camera above the target");
     let centre = true_brdf(scene.material.as_ref(), &scene.geometry, truth, [0.0; 2]);
     let typical = (centre.iter().sum::<f64>() / 3.0).min(std::f64::consts::FRAC_1_PI)
-        * truth.light.theta.cos();
+        * truth.light.theta.cosine();
     let Noise { shot, read } = scene.noise.unwrap_or(Noise {
         shot: 0.0,
         read: 0.0,
@@ -123,8 +124,8 @@ fn errors(scene: &Scene, rig: &Rig, truth: Pose, shot: u64) -> Vec<SampleError> 
         let pixel =
             ((shot * shot * typical * radiance) + (read * typical).powi(2)).sqrt() / radiance;
         out.push(SampleError {
-            distance_mm: at[0].hypot(at[1]),
-            log: (f64::from(value.rgb[1]) / radiance).ln(),
+            distance_mm: at[0].hypotenuse(at[1]),
+            log: (f64::from(value.rgb[1]) / radiance).natural_log(),
             limit: MEDIAN * pixel / f64::from(value.pixels.max(1)).sqrt(),
             direction_deg: direction_error(
                 &found,
@@ -384,7 +385,7 @@ fn hough() {
                 for k in 0..12 {
                     let off = 0.15 * f64::from(k + 1);
                     let turn = f64::from(k) * 2.4;
-                    let reading = pose(a, b, c + off * turn.cos(), d + off * turn.sin());
+                    let reading = pose(a, b, c + off * turn.cosine(), d + off * turn.sine());
                     let found = registrar.register(&frame, reading);
                     locked += usize::from(found.state == RegistrationState::Locked);
                     if k == 4 {

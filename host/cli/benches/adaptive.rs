@@ -11,6 +11,7 @@
 mod drawing;
 
 use drawing::{Line, draw};
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::interpolate::{ErrorBars, FillSettings};
 use gonia_brdf::model::{Kurt, KurtLobe};
@@ -137,7 +138,7 @@ fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars
 /// The plan nearest to `n` poses with lights and views equally dense, in rings.
 fn even(n: usize) -> Vec<Pose> {
     let ring = |theta: f64, step: f64| {
-        let around = 360.0 * theta.to_radians().sin() / step;
+        let around = 360.0 * theta.to_radians().sine() / step;
         (theta, around.round().max(1.0) as usize)
     };
     let plan = |step: f64| {
@@ -158,7 +159,7 @@ fn even(n: usize) -> Vec<Pose> {
 fn measure(model: &dyn Brdf, poses: &[Pose]) -> Vec<Sample> {
     let points: Vec<[f64; 2]> = (-19..=19)
         .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
-        .filter(|p| p[0].hypot(p[1]) <= REACH.radius_m)
+        .filter(|p| p[0].hypotenuse(p[1]) <= REACH.radius_m)
         .collect();
     let of_frame = |(frame, pose): (usize, &Pose)| -> Vec<Sample> {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(frame as u64);

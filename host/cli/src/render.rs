@@ -3,6 +3,7 @@
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Brdf;
+use gonia_brdf::Elementary;
 use gonia_formats::dense::read_dense;
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::photo::read_photo;
@@ -83,7 +84,7 @@ impl Render {
         let picture = progress.stage(&format!("drawing with {} lights", lights.len()), |_| {
             anyhow::Ok(draw(&brdf, &lights, self.px, 1).with_smooth_outline())
         })?;
-        let exposure = picture.exposure(0.985, 0.82) * self.exposure.exp2();
+        let exposure = picture.exposure(0.985, 0.82) * 2f32.power(self.exposure);
         let pixels = tone::picture_rgba(&picture, exposure);
         write_whole_bytes(
             &self.output,

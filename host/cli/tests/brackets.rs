@@ -4,6 +4,7 @@
 mod common;
 
 use common::{gonia, gonia_ok, text};
+use gonia_brdf::Elementary;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction, Pose};
 use gonia_formats::frame_exr::read_frame;
@@ -119,7 +120,7 @@ fn brackets_of_rgb_and_bayer_sensors_become_absolute_samples() {
                     at(s.theta_i_deg, s.phi_i_deg),
                     at(s.theta_v_deg, s.phi_v_deg),
                 );
-                logs.extend((0..3).map(|c| (f64::from(s.rgb[c]) / f[c]).ln()));
+                logs.extend((0..3).map(|c| (f64::from(s.rgb[c]) / f[c]).natural_log()));
             }
             let n = logs.len() as f64;
             let bias = logs.iter().sum::<f64>() / n;

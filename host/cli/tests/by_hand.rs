@@ -5,6 +5,7 @@
 mod common;
 
 use common::{gonia_ok, text};
+use gonia_brdf::Elementary;
 use gonia_brdf::Sample;
 use gonia_formats::samples::read_samples;
 use std::f64::consts::PI;
@@ -42,15 +43,15 @@ const REFERENCE: [f64; 3] = [0.99, 0.98, 0.97];
 
 fn vector(theta_deg: f64, phi_deg: f64) -> [f64; 3] {
     let (t, p) = (theta_deg.to_radians(), phi_deg.to_radians());
-    [t.sin() * p.cos(), t.sin() * p.sin(), t.cos()]
+    [t.sine() * p.cosine(), t.sine() * p.sine(), t.cosine()]
 }
 
 /// Where the ray through a pixel meets the target, metres.
 fn target_point(theta_deg: f64, phi_deg: f64, column: f64, row: f64) -> [f64; 2] {
     let d = vector(theta_deg, phi_deg);
     let (t, p) = (theta_deg.to_radians(), phi_deg.to_radians());
-    let right = [-p.sin(), p.cos(), 0.0];
-    let up = [-t.cos() * p.cos(), -t.cos() * p.sin(), t.sin()];
+    let right = [-p.sine(), p.cosine(), 0.0];
+    let up = [-t.cosine() * p.cosine(), -t.cosine() * p.sine(), t.sine()];
     let (x, y) = ((column - 150.0) / FOCAL_PX, (150.0 - row) / FOCAL_PX);
     let ray: Vec<f64> = (0..3).map(|k| x * right[k] + y * up[k] - d[k]).collect();
     let s = -1.8 * d[2] / ray[2];

@@ -14,6 +14,7 @@ use gonia_acquire::capture::{
     Arms, Ended, Orders, SessionEvent, ShotOptions, UnattendedSession, Watch, free_mb,
 };
 use gonia_acquire::session::{SessionEnd, SessionFolder, SessionWriter, verify};
+use gonia_brdf::Elementary;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction};
 use gonia_formats::samples::read_samples;
@@ -166,7 +167,7 @@ fn judge(folder: &Path) -> (usize, f64, f64) {
             at(s.theta_i_deg, s.phi_i_deg),
             at(s.theta_v_deg, s.phi_v_deg),
         );
-        logs.extend((0..3).map(|c| (f64::from(s.rgb[c]) / f[c]).ln()));
+        logs.extend((0..3).map(|c| (f64::from(s.rgb[c]) / f[c]).natural_log()));
     }
     let n = logs.len() as f64;
     let rms = (logs.iter().map(|l| l * l).sum::<f64>() / n).sqrt();

@@ -7,6 +7,7 @@
 use crate::FileError;
 use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_brdf::Brdf;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot, normalize};
 use gonia_rig::Scale;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -58,17 +59,17 @@ fn read_merl(path: &Path) -> Result<Merl, FileError> {
 impl Brdf for Merl {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
         let h = normalize([light[0] + view[0], light[1] + view[1], light[2] + view[2]]);
-        let theta_h = h[2].clamp(-1.0, 1.0).acos();
-        let theta_d = dot(light, h).clamp(-1.0, 1.0).acos();
+        let theta_h = h[2].clamp(-1.0, 1.0).arc_cosine();
+        let theta_d = dot(light, h).clamp(-1.0, 1.0).arc_cosine();
         // The light in the frame of the half vector: x along the normal's fall.
-        let in_plane = h[0].hypot(h[1]).max(1e-12);
+        let in_plane = h[0].hypotenuse(h[1]).max(1e-12);
         let (cos_phi, sin_phi) = (h[0] / in_plane, h[1] / in_plane);
         let turned = [
             light[0] * cos_phi + light[1] * sin_phi,
             light[1] * cos_phi - light[0] * sin_phi,
         ];
-        let (sin_h, cos_h) = theta_h.sin_cos();
-        let phi_d = turned[1].atan2(turned[0] * cos_h - light[2] * sin_h);
+        let (sin_h, cos_h) = theta_h.sine_cosine();
+        let phi_d = turned[1].arc_tangent2(turned[0] * cos_h - light[2] * sin_h);
         let phi_d = if phi_d < 0.0 { phi_d + PI } else { phi_d };
         let index = |value: f64, n: usize| (value as usize).min(n - 1);
         let half = index(

@@ -2,6 +2,7 @@
 
 use crate::FileError;
 use crate::frame_exr::read_frame;
+use gonia_brdf::Elementary;
 use gonia_rig::Frame;
 use png::{BitDepth, ColorType, Transformations};
 use std::fs::File;
@@ -62,7 +63,7 @@ fn linear(encoded: f32) -> f32 {
     if encoded <= 0.040_45 {
         encoded / 12.92
     } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
+        ((encoded + 0.055) / 1.055).power(2.4)
     }
 }
 
@@ -78,7 +79,7 @@ mod tests {
         // IEC 61966-2-1: linear below 0.0031308.
         let encoded = |v: f32| match v {
             v if v <= 0.003_130_8 => 12.92 * v,
-            v => 1.055 * v.powf(1.0 / 2.4) - 0.055,
+            v => 1.055 * v.power(1.0 / 2.4) - 0.055,
         };
         let bytes: Vec<u8> = light
             .iter()

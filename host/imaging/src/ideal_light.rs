@@ -30,13 +30,14 @@ impl IdealLight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Elementary;
 
     #[test]
     fn irradiance_follows_cosine_and_distance() {
         let light = IdealLight::new(Direction::from_deg(60.0, 90.0), 1.1);
         assert!((light.irradiance([0.0; 2]) - 0.5).abs() < 1e-12);
         // Straight below the light, at half the distance.
-        let below = 1100.0 * 60f64.to_radians().sin();
+        let below = 1100.0 * 60f64.to_radians().sine();
         assert!((light.irradiance([0.0, below]) - 4.0).abs() < 1e-9);
     }
 }

@@ -1,6 +1,7 @@
 //! The neighbourhoods of the four lines: pixels along runs across each predicted line.
 
 use crate::luminance;
+use gonia_brdf::Elementary;
 use gonia_rig::{CameraModel, Frame, Homography, Target};
 
 /// The lines x = −a, x = +a, y = −a, y = +a, in this order everywhere.
@@ -88,7 +89,7 @@ impl LineStrip {
     ) -> Self {
         let a = target.line_offset_mm;
         let [from, to] = side.ends_mm(a).map(|end| target_to_px.apply(end));
-        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let length = (to[0] - from[0]).hypotenuse(to[1] - from[1]);
         let along = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
         let mut middle = [0.0; 2];
         middle[side.axis] = side.sign * a;
@@ -119,7 +120,7 @@ impl LineStrip {
                 (d[0] * outward[0] + d[1] * outward[1]).abs()
             };
             // Perspective makes the near end of a line up to half as wide again as its middle.
-            let half_line = 0.75 * target.line_width_mm * step[0].hypot(step[1]);
+            let half_line = 0.75 * target.line_width_mm * step[0].hypotenuse(step[1]);
             let reach_px = search_px + half_line + WINDOW_PX;
             strip.fill(frame, camera, reach_px, reach, across);
         }

@@ -4,6 +4,7 @@ use crate::ideal_light::IdealLight;
 use crate::luminance;
 use crate::register::Registration;
 use gonia_brdf::Direction;
+use gonia_brdf::Elementary;
 use gonia_rig::{Frame, Rig};
 
 /// The hidden parts of a frame: a bitmap of the smallest rectangle that holds them, one bit for a
@@ -201,7 +202,7 @@ impl Cells {
         // Pixels on the material's edge are part desk.
         let jacobian = registration.pixel_from_target.jacobian([0.0; 2]);
         let inset = jacobian.map(|column| {
-            rig.target.material_half_mm - EDGE_PX / column[0].hypot(column[1]).max(1e-6)
+            rig.target.material_half_mm - EDGE_PX / column[0].hypotenuse(column[1]).max(1e-6)
         });
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
             .map(|c: [f64; 2]| registration.project([c[0] * inset[0], c[1] * inset[1]]));

@@ -7,6 +7,7 @@
 //! the model because at grazing views it comes within a pixel of the line.
 
 use crate::lines::RunSample;
+use gonia_brdf::Elementary;
 
 /// How far the fit's window goes past an edge, in standard deviations of the blur, plus a pixel.
 const WINDOW_SIGMAS: f64 = 3.0;
@@ -194,7 +195,7 @@ fn normal(z: f64) -> (f64, f64) {
         * (0.254_829_592
             + t * (-0.284_496_736
                 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
-    let e = (-half * half).exp();
+    let e = (-half * half).exponential();
     let upper = 0.5 * poly * e;
     const DENSITY: f64 = 0.398_942_280_401_432_7;
     (if z >= 0.0 { 1.0 - upper } else { upper }, DENSITY * e)
@@ -237,7 +238,7 @@ mod tests {
             at += (c * fit.right[0] - b * fit.right[1]) / det;
             sigma *= ((a * fit.right[1] - b * fit.right[0]) / det)
                 .clamp(-0.3, 0.3)
-                .exp();
+                .exponential();
         }
         assert!((at - 0.37).abs() < 1e-3, "{at}");
         assert!((sigma - 0.5).abs() < 2e-3, "{sigma}");

@@ -3,6 +3,7 @@
 use crate::hough::StripLine;
 use crate::lines::{LineStrip, RunSample, Station};
 use crate::profile::{LineProfile, StationFit};
+use gonia_brdf::Elementary;
 use gonia_rig::Target;
 use nalgebra::{SMatrix, SVector};
 
@@ -102,8 +103,8 @@ pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> L
             lines[i].slope += change[1];
             largest = largest.max(change[0].abs()).max(change[1].abs());
         }
-        sigma =
-            (sigma * step[8].clamp(-0.4, 0.4).exp()).clamp(SIGMA_RANGE_PX[0], SIGMA_RANGE_PX[1]);
+        sigma = (sigma * step[8].clamp(-0.4, 0.4).exponential())
+            .clamp(SIGMA_RANGE_PX[0], SIGMA_RANGE_PX[1]);
         sums = [0, 1, 2, 3].map(|i| sum_line(&strips[i], lines[i], sigma, target));
         if largest < 2e-3 && step[8].abs() < 1e-2 {
             break;
@@ -263,7 +264,7 @@ fn joint_step(sums: &[LineSums; 4], found: [bool; 4], sigma: f64) -> SVector<f64
     let mut right = SVector::<f64, 9>::zeros();
     let prior = LN_SIGMA_PRIOR.powi(-2);
     normal[(8, 8)] = prior;
-    right[8] = -prior * (sigma / START_SIGMA_PX).ln();
+    right[8] = -prior * (sigma / START_SIGMA_PX).natural_log();
     for (i, line) in sums.iter().enumerate() {
         let at = [2 * i, 2 * i + 1, 8];
         if !found[i] {

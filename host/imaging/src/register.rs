@@ -8,6 +8,7 @@
 use crate::hough::{StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
+use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
 use nalgebra::{DMatrix, DVector};
@@ -279,7 +280,10 @@ impl Registrar {
             return Err(Failure::new(estimate.wrong_layout(), &fit));
         }
         let shift = estimate.shift;
-        let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
+        let offset_deg = shift
+            .theta
+            .hypotenuse(shift.phi * view.theta.sine())
+            .to_degrees();
         if offset_deg > MAX_OFFSET_DEG {
             return Err(Failure::new(
                 RegistrationFailure::FarFromPose { offset_deg },

@@ -4,6 +4,7 @@ use crate::occlusion::Mask;
 use crate::patch::Patch;
 use crate::quantiles::{Workspace, median_and_spread};
 use crate::register::Registration;
+use gonia_brdf::Elementary;
 use gonia_rig::{Frame, Rig};
 
 /// The points of a rig's sampling grid: multiples of the grid step inside the disc, row by row.
@@ -57,7 +58,7 @@ impl SamplingGrid {
         for j in -n..=n {
             for i in -n..=n {
                 let point = [i as f64 * step, j as f64 * step];
-                if point[0].hypot(point[1]) <= radius {
+                if point[0].hypotenuse(point[1]) <= radius {
                     points_mm.push(point);
                 }
             }

@@ -1,6 +1,7 @@
 //! Sampling and occlusion against the simulator's truth.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::Pose;
 use gonia_brdf::direction::{angle_between, local_direction};
 use gonia_imaging::*;
@@ -73,7 +74,7 @@ fn values_belong_to_the_place_they_name_even_where_patches_hold_few_pixels() {
                 let place = [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]));
                 let f = true_brdf(scene.material.as_ref(), &scene.geometry, truth, place);
                 let measured = f64::from(value.rgb[0]) / light.irradiance(place);
-                let error = (measured / f[0]).ln().abs();
+                let error = (measured / f[0]).natural_log().abs();
                 assert!(error < limit, "{px} {angles:?} {at:?}: {error}");
             }
         }
@@ -214,7 +215,7 @@ fn values_are_unbiased_and_scatter_as_little_as_a_median_can() {
         let light = IdealLight::new(truth.light, 1.1);
         let at_centre = true_brdf(scene.reference.as_ref(), &scene.geometry, truth, [0.0; 2]);
         let mean = at_centre.iter().sum::<f64>() / 3.0;
-        let typical = mean.min(std::f64::consts::FRAC_1_PI) * truth.light.theta.cos();
+        let typical = mean.min(std::f64::consts::FRAC_1_PI) * truth.light.theta.cosine();
         let mut bias = 0.0;
         for (at, value) in grid
             .points_mm()
@@ -225,7 +226,7 @@ fn values_are_unbiased_and_scatter_as_little_as_a_median_can() {
             let place = [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]));
             let f = true_brdf(scene.reference.as_ref(), &scene.geometry, truth, place);
             let radiance = f[1] * light.irradiance(place);
-            let off = (f64::from(value.rgb[1]) / radiance).ln();
+            let off = (f64::from(value.rgb[1]) / radiance).natural_log();
             let shot = noise.shot * noise.shot * typical * radiance;
             let sd = (shot + (noise.read * typical).powi(2)).sqrt() / radiance;
             let limit = 1.2533 * sd / f64::from(value.pixels).sqrt();

@@ -1,5 +1,6 @@
 //! A kernel of one's own in the default method, compared with the usual one.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate::Kernel;
 use gonia_brdf::model::Kurt;
@@ -18,7 +19,7 @@ impl Kernel for Matern52 {
     }
 
     fn correlation(&self, s: f32) -> f32 {
-        (1.0 + s + s * s / 3.0) * (-s).exp()
+        (1.0 + s + s * s / 3.0) * (-s).exponential()
     }
 
     fn scale(&self) -> f32 {

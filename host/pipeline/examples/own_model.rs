@@ -1,5 +1,6 @@
 //! A model of one's own, fitted to a dense BRDF: Minnaert's, for dark and dusty surfaces.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::fit::{FitSettings, ModelFamily, Parameter, ParameterValues, Range};
 use gonia_brdf::{Brdf, DenseBrdf, Grid, Vec3};
 use gonia_pipeline::fit::{cells_of_dense, fit_model};
@@ -18,7 +19,7 @@ struct Minnaert {
 
 impl Brdf for Minnaert {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
-        let shape = (light[2] * view[2]).powf(self.k - 1.0) / std::f64::consts::PI;
+        let shape = (light[2] * view[2]).power(self.k - 1.0) / std::f64::consts::PI;
         self.albedo.map(|rho| rho * shape)
     }
 }

@@ -14,6 +14,7 @@
 //!   lights and the same exposure, as a screen shows them (clipped at white).
 
 use crate::accumulate::{Cell, Sums};
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_render as render;
@@ -322,11 +323,11 @@ impl<'a> Pair<'a> {
                 interior_luminance.0 += f64::from(color::luminance(*b));
                 interior_luminance.1 += 1;
                 let positive = (0..3).filter(|c| a[*c] > floor[0] && b[*c] > floor[1]);
-                log_ratios.extend(positive.map(|c| (b[c] / a[c]).ln()));
+                log_ratios.extend(positive.map(|c| (b[c] / a[c]).natural_log()));
             }
         }
         let factor = match (self.is_relative(), quantile(&mut log_ratios, 0.5)) {
-            (true, Some(median)) => median.exp(),
+            (true, Some(median)) => median.exponential(),
             _ => 1.0,
         };
         let mean = interior_luminance.0 / interior_luminance.1.max(1) as f64;
@@ -384,7 +385,7 @@ impl<'a> Pair<'a> {
             sums.floored[0] += u64::from(a[c] <= floor[0]);
             sums.floored[1] += u64::from(b[c] <= floor[1]);
         }
-        let log = [0, 1, 2].map(|c| (a[c].max(floor[0]) / b[c].max(floor[1])).ln());
+        let log = [0, 1, 2].map(|c| (a[c].max(floor[0]) / b[c].max(floor[1])).natural_log());
 
         let a_mirror = self.a_at(view, light).map(|v| v * scan.factor);
         let reciprocity_b = match self.b {
@@ -433,7 +434,7 @@ fn log_distance(f: [f32; 3], g: [f32; 3], floor: f32) -> f32 {
     }
     (0..3)
         .map(|c| {
-            let log = (f[c].max(floor) / g[c].max(floor)).ln();
+            let log = (f[c].max(floor) / g[c].max(floor)).natural_log();
             log * log
         })
         .sum()
@@ -519,8 +520,8 @@ mod tests {
         let dense = tabulate(15.0, |i, v| truth.eval(i, v).map(|f| 1.1 * f));
         let figures = compare(absolute(&dense), Side::Model(&truth), &Options::default()).unwrap();
         for row in &figures.strata {
-            assert!((row.log_rms - 1.1f64.ln()).abs() < 1e-5);
-            assert!((row.log_mean - 1.1f64.ln()).abs() < 1e-5);
+            assert!((row.log_rms - 1.1f64.natural_log()).abs() < 1e-5);
+            assert!((row.log_mean - 1.1f64.natural_log()).abs() < 1e-5);
             assert!((row.cos_error_mean - 0.1).abs() < 1e-5);
         }
         let figures = compare(relative(&dense), Side::Model(&truth), &Options::default()).unwrap();

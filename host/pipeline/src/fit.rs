@@ -4,6 +4,7 @@ use crate::Error;
 use crate::compare::{Options, Side, Table, compare};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
+use gonia_brdf::Elementary;
 use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
 use gonia_brdf::{Bins, DenseBrdf, Sample};
 use gonia_formats::dense::write_dense;
@@ -131,7 +132,7 @@ pub fn write_fit(path: &Path, result: FitResult, scale: Scale) -> Result<(), Err
 
 /// A number with five significant digits.
 pub fn five_digits(value: f64) -> String {
-    let digits = 4 - value.abs().max(1e-9).log10().floor() as i32;
+    let digits = 4 - value.abs().max(1e-9).decimal_log().floor() as i32;
     format!("{value:.*}", digits.clamp(0, 8) as usize)
 }
 

@@ -5,6 +5,7 @@
 //! test fails when the page says something else.
 #![allow(clippy::unwrap_used)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{angle_between, local_direction};
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Direction, Pose};
@@ -122,7 +123,7 @@ fn stripes(at: f64, period: f64) -> f32 {
 fn cases() -> Vec<Case> {
     use Must::{BeBlind, NotMistake, Refuse, Use};
     let vignette: Change = |v, p, _, _| {
-        let r = (p[0] - 256.0).hypot(p[1] - 256.0) / 256.0;
+        let r = (p[0] - 256.0).hypotenuse(p[1] - 256.0) / 256.0;
         v.map(|c| c * (1.0 / (1.0 + 1.2 * r * r)) as f32)
     };
     let parallel: Change = |v, _, at, _| {
@@ -151,12 +152,12 @@ fn cases() -> Vec<Case> {
     };
     let flare: Change = |v, _, at, _| {
         let r2 = ((at[0] - 335.0).powi(2) + (at[1] - 60.0).powi(2)) / (2.0 * 12.0f64.powi(2));
-        let flared = v.map(|c| c + 20.0 * (-r2).exp() as f32);
+        let flared = v.map(|c| c + 20.0 * (-r2).exponential() as f32);
         flared.map(|c| if c > 2.0 { f32::INFINITY } else { c })
     };
     let long_flare: Change = |v, _, at, _| {
         let r2 = ((at[0] - 332.0) / 8.0).powi(2) / 2.0;
-        v.map(|c| c + 3.0 * (-r2).exp() as f32)
+        v.map(|c| c + 3.0 * (-r2).exponential() as f32)
     };
     let covered: Change = |v, _, at, _| {
         if at[0] < -335.0 + 0.3 * 670.0 {
@@ -409,7 +410,7 @@ fn look(
         match (value, clean) {
             (Ok(value), Ok(clean)) => row.errors.push(
                 f64::from(value.rgb[1].max(1e-6) / clean.rgb[1].max(1e-6))
-                    .ln()
+                    .natural_log()
                     .abs(),
             ),
             (Err(LeftOut::Occlusion), _) => row.left_out[0] += 1,
@@ -439,7 +440,7 @@ fn look(
             [-335.0, 335.0],
         ] {
             let (a, b) = (found.project(corner), map.apply(corner));
-            row.locked_px = row.locked_px.max((a[0] - b[0]).hypot(a[1] - b[1]));
+            row.locked_px = row.locked_px.max((a[0] - b[0]).hypotenuse(a[1] - b[1]));
         }
     } else {
         row.by_pose += 1;

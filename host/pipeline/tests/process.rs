@@ -1,6 +1,7 @@
 //! The whole chain from frames to samples against the simulator's truth.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction, Pose, Sample};
 use gonia_formats::FileError;
@@ -114,7 +115,7 @@ fn errors(processed: &Processed, truth: &dyn Brdf) -> Vec<FrameError> {
                 let at = |t: f32, p: f32| Direction::from_deg(t.into(), p.into()).to_vec3();
                 let light = at(s.theta_i_deg, s.phi_i_deg);
                 let f = truth.eval(light, at(s.theta_v_deg, s.phi_v_deg));
-                (f64::from(s.rgb[1]) / f[1]).ln()
+                (f64::from(s.rgb[1]) / f[1]).natural_log()
             })
             .collect();
         let n = logs.len() as f64;
@@ -433,7 +434,7 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
                     at(s.theta_i_deg, s.phi_i_deg),
                     at(s.theta_v_deg, s.phi_v_deg),
                 );
-                (f64::from(s.rgb[1]) / f[1] / factor).ln()
+                (f64::from(s.rgb[1]) / f[1] / factor).natural_log()
             })
             .collect();
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;

@@ -5,6 +5,7 @@
 //! there before. Poses are taken one by one, each time the one that takes away the most; what it
 //! will take away is taken off before the next is chosen, so that they do not crowd.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot, local_direction};
 use gonia_brdf::hemisphere::{Ring, directions};
 use gonia_brdf::{Direction, Grid, Pose};
@@ -160,12 +161,12 @@ fn nearest(place: Place, others: &[Place]) -> f64 {
 
 /// All pairs of directions to choose from.
 fn candidates(reach: &Reach) -> Vec<Pose> {
-    let closest = reach.keep_out_deg.to_radians().cos();
+    let closest = reach.keep_out_deg.to_radians().cosine();
     let [lights, views] = reach.theta_max_deg.map(|last_deg| {
         let last = (last_deg / STEP_DEG + 1e-9).floor() as usize;
         let ring = |k: usize| {
             let theta = k as f64 * STEP_DEG;
-            let around = 360.0 * theta.to_radians().sin() / STEP_DEG;
+            let around = 360.0 * theta.to_radians().sine() / STEP_DEG;
             (theta, around.round().max(1.0) as usize)
         };
         directions(&(0..=last).map(ring).collect::<Vec<Ring>>())
@@ -188,7 +189,7 @@ fn sheet(pose: &Pose, reach: &Reach) -> [Place; SHEET_POINTS] {
         .flat_map(|(radius, n)| (0..*n).map(move |k| (*radius, k as f64 / *n as f64)));
     std::array::from_fn(|_| {
         let (radius, turn) = points.next().unwrap_or_default();
-        let (s, c) = (std::f64::consts::TAU * turn).sin_cos();
+        let (s, c) = (std::f64::consts::TAU * turn).sine_cosine();
         let point = [c, s].map(|x| x * radius * reach.radius_m);
         [
             local_direction(pose.light, reach.light_m, point),

@@ -2,12 +2,13 @@
 
 use crate::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
+use gonia_brdf::Elementary;
 
 /// Draws what fills the outline of a smooth upright cylinder seen from the side: the picture's left
 /// and right edges are the cylinder's. The material's x axis runs around it towards the right, its
 /// y axis up along it, both turned anticlockwise by `turn_deg`.
 pub fn bent(brdf: &dyn Brdf, lights: &[Light], size: (usize, usize), turn_deg: f64) -> Picture {
-    let (turn_sin, turn_cos) = turn_deg.to_radians().sin_cos();
+    let (turn_sin, turn_cos) = turn_deg.to_radians().sine_cosine();
     Picture::draw(brdf, lights, size, 1, |x, _| {
         let forwards = (1.0 - x * x).max(0.0).sqrt();
         let (around, up) = ([forwards, 0.0, -x], [0.0, 1.0, 0.0]);
@@ -41,7 +42,7 @@ mod tests {
         let lights = from_above(40.0, 0.0);
         let picture = bent(&grey, &lights, (101, 7), 0.0);
         let at = |column: usize| f64::from(picture.rgb[3 * 101 + column][1]);
-        let cosine = 40f64.to_radians().cos();
+        let cosine = 40f64.to_radians().cosine();
         assert!((at(50) / (0.5 * cosine) - 1.0).abs() < 1e-3);
         assert!((at(75) / at(50) - (1.0f64 - (50.0f64 / 101.0).powi(2)).sqrt()).abs() < 1e-3);
         let across = bent(&Striped, &lights, (101, 1), 0.0);

@@ -2,6 +2,7 @@
 
 use crate::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{dot, normalize};
 
 /// Radius without folds, and half the height, in the picture, whose half side is 1.
@@ -33,7 +34,7 @@ fn radius(azimuth: f64, y: f64) -> (f64, f64, f64) {
     let depth_by_y = -DEPTH * RADIUS * down / HALF_HEIGHT;
     // The folds wander a little on their way down.
     let phase = FOLDS * azimuth + 0.5 * y + 0.6;
-    let (s, c) = phase.sin_cos();
+    let (s, c) = phase.sine_cosine();
     (
         RADIUS + depth * c,
         -FOLDS * depth * s,
@@ -45,7 +46,7 @@ fn radius(azimuth: f64, y: f64) -> (f64, f64, f64) {
 /// to x; `None` beside the cylinder.
 fn front_azimuth(x: f64, y: f64) -> Option<f64> {
     const STEPS: usize = 48;
-    let across = |azimuth: f64| radius(azimuth, y).0 * azimuth.sin() - x;
+    let across = |azimuth: f64| radius(azimuth, y).0 * azimuth.sine() - x;
     let outwards = x.signum();
     let step = outwards * std::f64::consts::FRAC_PI_2 / STEPS as f64;
     let last = (0..STEPS).find(|k| across((k + 1) as f64 * step) * outwards >= 0.0)?;
@@ -64,7 +65,7 @@ fn front_azimuth(x: f64, y: f64) -> Option<f64> {
 /// The frame of the point (r sin α, y, r cos α).
 fn frame_at(azimuth: f64, y: f64) -> TangentFrame {
     let (r, r_azimuth, r_y) = radius(azimuth, y);
-    let (s, c) = azimuth.sin_cos();
+    let (s, c) = azimuth.sine_cosine();
     let around = normalize([r_azimuth * s + r * c, 0.0, r_azimuth * c - r * s]);
     let up = [r_y * s, 1.0, r_y * c];
     let slant = dot(up, around);
@@ -101,7 +102,7 @@ mod tests {
             let azimuth = front_azimuth(x, y).unwrap();
             let point = |a: f64, y: f64| {
                 let r = radius(a, y).0;
-                [r * a.sin(), y, r * a.cos()]
+                [r * a.sine(), y, r * a.cosine()]
             };
             assert!((point(azimuth, y)[0] - x).abs() < 1e-6);
             let frame = frame_at(azimuth, y);

@@ -2,6 +2,7 @@
 
 use crate::Light;
 use crate::color::luminance;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot, normalize};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -33,10 +34,11 @@ impl Environment {
         let sun = normalize([-0.55, 0.62, 0.56]);
         let pixel = |at: usize| {
             let towards = direction(at % WIDTH, at / WIDTH, WIDTH, HEIGHT);
-            let near_sun = dot(towards, sun).clamp(-1.0, 1.0).acos().to_degrees();
+            let near_sun = dot(towards, sun).clamp(-1.0, 1.0).arc_cosine().to_degrees();
             // A disc of a few degrees instead of half of one: soft edges, the same light.
-            let sun = [1.0, 0.92, 0.78].map(|c| c * 60.0 * (-(near_sun / 4.0).powi(2)).exp());
-            let glow = [1.0, 0.9, 0.75].map(|c| c * 0.8 * (-near_sun / 18.0).exp());
+            let sun =
+                [1.0, 0.92, 0.78].map(|c| c * 60.0 * (-(near_sun / 4.0).powi(2)).exponential());
+            let glow = [1.0, 0.9, 0.75].map(|c| c * 0.8 * (-near_sun / 18.0).exponential());
             let up = towards[1];
             let dome = if up >= 0.0 {
                 let haze = (1.0 - up).powi(3);
@@ -75,7 +77,7 @@ impl Environment {
         }
         // The longer side in angle; columns draw together towards the poles.
         let middle = (region.rows.start + region.rows.end) as f64 * 0.5;
-        let width = wide as f64 * (middle / self.height as f64 * PI).sin().max(0.05);
+        let width = wide as f64 * (middle / self.height as f64 * PI).sine().max(0.05);
         let along_columns = high == 1 || (wide > 1 && width > high as f64);
         let slices = if along_columns {
             region.columns.clone()
@@ -146,7 +148,7 @@ impl Environment {
     /// The solid angle of a pixel.
     fn solid_angle(&self, at: usize) -> f64 {
         let theta = ((at / self.width) as f64 + 0.5) / self.height as f64 * PI;
-        theta.sin() * (TAU / self.width as f64) * (PI / self.height as f64)
+        theta.sine() * (TAU / self.width as f64) * (PI / self.height as f64)
     }
 }
 
@@ -192,9 +194,9 @@ impl Region {
 
 /// Where a pixel of the map looks, in camera space.
 fn direction(column: usize, row: usize, width: usize, height: usize) -> Vec3 {
-    let (s, c) = ((row as f64 + 0.5) / height as f64 * PI).sin_cos();
+    let (s, c) = ((row as f64 + 0.5) / height as f64 * PI).sine_cosine();
     let around = ((column as f64 + 0.5) / width as f64 - 0.5) * TAU;
-    [s * around.sin(), c, -s * around.cos()]
+    [s * around.sine(), c, -s * around.cosine()]
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Directional lights.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, normalize};
 use gonia_brdf::model::shading::Light;
 use std::f64::consts::PI;
@@ -11,8 +12,8 @@ pub fn single() -> Vec<Light> {
 
 /// A single light, so many degrees above the line of sight and to the right of it.
 pub fn from_above(up_deg: f64, right_deg: f64) -> Vec<Light> {
-    let (up_sin, up_cos) = up_deg.to_radians().sin_cos();
-    let (right_sin, right_cos) = right_deg.to_radians().sin_cos();
+    let (up_sin, up_cos) = up_deg.to_radians().sine_cosine();
+    let (right_sin, right_cos) = right_deg.to_radians().sine_cosine();
     vec![Light {
         towards: [up_cos * right_sin, up_sin, up_cos * right_cos],
         irradiance: [PI; 3],
@@ -44,7 +45,7 @@ fn dome(n: usize, white: f64) -> Vec<Light> {
         .map(|k| {
             let y = (k as f64 + 0.5) / n as f64;
             let r = (1.0 - y * y).sqrt();
-            let (s, c) = (golden * k as f64).sin_cos();
+            let (s, c) = (golden * k as f64).sine_cosine();
             let share = (0.4 + 0.6 * y) / n as f64 / 0.4;
             Light {
                 towards: [r * c, y, r * s],

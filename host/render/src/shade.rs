@@ -271,12 +271,13 @@ fn arc(y: f32, x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Elementary;
 
     #[test]
     fn the_arc_is_that_of_every_quarter() {
         for k in 0..3600 {
             let angle = f64::from(k) * 1e-1f64.to_radians();
-            let (s, c) = angle.sin_cos();
+            let (s, c) = angle.sine_cosine();
             let found = f64::from(arc(s as f32, c as f32));
             let off = (found - angle).abs();
             assert!(off.min(std::f64::consts::TAU - off) < 2e-6, "{k}: {found}");

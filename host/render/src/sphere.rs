@@ -2,6 +2,7 @@
 
 use crate::{Light, Picture, TangentFrame};
 use gonia_brdf::Brdf;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::Vec3;
 
 /// Radius in the picture, whose half side is 1.
@@ -22,7 +23,7 @@ pub fn sphere(brdf: &dyn Brdf, lights: &[Light], px: usize, side: usize) -> Pict
 fn frame_at(normal: Vec3) -> TangentFrame {
     let [x, y, z] = normal;
     // up × normal, and normal × tangent.
-    let s = 1.0 / x.hypot(z).max(1e-12);
+    let s = 1.0 / x.hypotenuse(z).max(1e-12);
     let tangent = [z * s, 0.0, -x * s];
     let bitangent = [-x * y * s, (x * x + z * z) * s, -y * z * s];
     TangentFrame {
@@ -51,7 +52,7 @@ mod tests {
     impl Brdf for Brushed {
         fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
             let h = [light[0] + view[0], light[1] + view[1], light[2] + view[2]];
-            [(-(h[1] / h[2]).powi(2) / 0.02).exp(); 3]
+            [(-(h[1] / h[2]).powi(2) / 0.02).exponential(); 3]
         }
     }
 

@@ -1,5 +1,6 @@
 //! The few things that every chart has.
 
+use gonia_brdf::Elementary;
 use maud::{Markup, html};
 
 /// The style of the report and of the live page; its first block holds the light colours.
@@ -78,7 +79,7 @@ pub fn round_up(value: f64) -> f64 {
     if !(value > 0.0 && value.is_finite()) {
         return 1.0;
     }
-    let power = 10f64.powf(value.log10().floor());
+    let power = 10f64.power(value.decimal_log().floor());
     let factor = [1.0, 2.0, 5.0, 10.0]
         .into_iter()
         .find(|f| f * power >= value * (1.0 - 1e-9));

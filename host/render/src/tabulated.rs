@@ -65,6 +65,7 @@ impl Brdf for Tabulated<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Elementary;
     use gonia_brdf::Grid;
     use gonia_brdf::model::shading::shade_one_by_one;
 
@@ -109,7 +110,7 @@ mod tests {
                 let t = f64::from(place % 60) * 1.7 + 0.1 * beside;
                 let p = f64::from(place) * 77.7 + 0.2 * beside;
                 // A frame turned by p about its normal, which leans by t towards x.
-                let (lean, across) = (t.to_radians().sin_cos(), p.to_radians().sin_cos());
+                let (lean, across) = (t.to_radians().sine_cosine(), p.to_radians().sine_cosine());
                 let down = [lean.1, 0.0, -lean.0];
                 let mix = |a: f64, b: f64| [a * down[0], b, a * down[2]];
                 TangentFrame {

@@ -1,6 +1,7 @@
 //! From linear light to the screen.
 
 use crate::Picture;
+use gonia_brdf::Elementary;
 
 /// The sRGB transfer curve (IEC 61966-2-1) of a linear value, clipped to 0 ..= 1, in 8 bits.
 pub fn srgb8(linear: f32) -> u8 {
@@ -8,7 +9,7 @@ pub fn srgb8(linear: f32) -> u8 {
     let encoded = if v <= 0.003_130_8 {
         12.92 * v
     } else {
-        1.055 * v.powf(1.0 / 2.4) - 0.055
+        1.055 * v.power(1.0 / 2.4) - 0.055
     };
     (255.0 * encoded + 0.5) as u8
 }

@@ -1,6 +1,7 @@
 //! The chart of `gonia chart`: error against cost, a panel an error figure, each with its Pareto
 //! front; and error against the number of images.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::interpolate::Preset;
 use gonia_pipeline::chart::{ChartPoint, Family, Method, front};
 use gonia_render::svg;
@@ -230,7 +231,7 @@ impl Panel {
         error: Figure,
     ) -> Option<Self> {
         let range = |figure: &dyn Fn(&ChartPoint) -> Option<f64>| {
-            let logs = points.iter().filter_map(figure).map(f64::log10);
+            let logs = points.iter().filter_map(figure).map(f64::decimal_log);
             let (low, high) = logs
                 .filter(|log| log.is_finite())
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
@@ -258,19 +259,22 @@ impl Panel {
     }
 
     fn place(&self, point: &ChartPoint) -> Option<(f64, f64)> {
-        let (x, y) = ((self.along)(point)?.log10(), (self.error)(point)?.log10());
+        let (x, y) = (
+            (self.along)(point)?.decimal_log(),
+            (self.error)(point)?.decimal_log(),
+        );
         (x.is_finite() && y.is_finite()).then(|| (self.x_of(x), self.y_of(y)))
     }
 
     fn axes(&self, axis: &str) -> Markup {
         html! {
             @for tick in ticks(self.x) {
-                @let x = self.x_of(tick.log10());
+                @let x = self.x_of(tick.decimal_log());
                 (svg::line(x, TOP, x, H - BOTTOM, "tick"))
                 (svg::text(x, H - BOTTOM + 14.0, "middle", "small", &short(tick)))
             }
             @for tick in ticks(self.y) {
-                @let y = self.y_of(tick.log10());
+                @let y = self.y_of(tick.decimal_log());
                 (svg::line(LEFT, y, W - RIGHT, y, "tick"))
                 (svg::text(LEFT - 5.0, y + 3.0, "end", "small", &short(tick)))
             }
@@ -353,7 +357,7 @@ fn ticks((low, high): (f64, f64)) -> Vec<f64> {
     let decades = low.floor() as i32..=high.ceil() as i32;
     decades
         .flat_map(|decade| factors.iter().map(move |f| f * 10f64.powi(decade)))
-        .filter(|tick| (low..=high).contains(&tick.log10()))
+        .filter(|tick| (low..=high).contains(&tick.decimal_log()))
         .collect()
 }
 
@@ -362,7 +366,7 @@ fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let digits = 2 - value.abs().log10().floor() as i32;
+    let digits = 2 - value.abs().decimal_log().floor() as i32;
     let scale = 10f64.powi(digits);
     let rounded = (value * scale).round() / scale;
     if (1e-4..1e6).contains(&rounded.abs()) {

@@ -397,6 +397,7 @@ fn megabytes(bytes: u64) -> String {
 mod tests {
     use super::*;
     use gonia_brdf::DenseBrdf;
+    use gonia_brdf::Elementary;
     use gonia_brdf::model::Kurt;
     use gonia_formats::{BinCounts, CellCounts, FileNote, FrameCounts, PoseCounts, Refused, Stage};
     use gonia_pipeline::compare::Table;
@@ -415,7 +416,7 @@ mod tests {
             for view in 0..n {
                 let (i, v) = (at[light], at[view]);
                 let wobble = 1.0
-                    + 0.03 * (7.0 * i.phi).sin() * (5.0 * v.phi).cos()
+                    + 0.03 * (7.0 * i.phi).sine() * (5.0 * v.phi).cosine()
                     + 0.05 * (i.theta_deg().max(v.theta_deg()) / 86.0).powi(8);
                 let f = truth.eval(i.to_vec3(), v.to_vec3());
                 for (plane, f) in planes.iter_mut().zip(f) {
@@ -453,7 +454,7 @@ mod tests {
             refused,
         });
         let errors: Vec<f64> = (0..4000)
-            .map(|k| 0.011 * (f64::from(k) * 0.37).sin().powi(3))
+            .map(|k| 0.011 * (f64::from(k) * 0.37).sine().powi(3))
             .collect();
         summary.pointing = Pointing::from_errors(&errors, 0.03);
         summary.bins = Some(BinCounts::new(10_418_625, mask));

@@ -1,6 +1,7 @@
 //! Slices as a sheet of nine panels with axes, ticks and one scale.
 
 use crate::slices::Slice;
+use gonia_brdf::Elementary;
 use gonia_render::{color_map, png, svg, tone};
 use maud::{Markup, html};
 
@@ -32,7 +33,7 @@ pub fn differences(slices: &[Slice<f32>], limit: f32) -> Markup {
     let paint = |v: &f32| color_map::diverging(v / limit);
     let ramp = |t: f32| color_map::diverging(2.0 * t - 1.0);
     let tick = |t: f64| {
-        let percent = 100.0 * (((2.0 * t - 1.0) * f64::from(limit)).exp() - 1.0);
+        let percent = 100.0 * (((2.0 * t - 1.0) * f64::from(limit)).exponential() - 1.0);
         (t, format!("{percent:+.1} %"))
     };
     let ticks = [0.0, 0.5, 1.0].map(tick).to_vec();

@@ -1,5 +1,6 @@
 //! Slices φi/φv at fixed polar angles, as the paper's Fig. 9 a.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_render::color::luminance;
 use gonia_rig::CellMask;
@@ -71,7 +72,7 @@ pub fn relative_errors(errors: &DenseBrdf, values: &DenseBrdf) -> Vec<Slice<f32>
 /// Mean over the channels of ln(a/b), cell by cell.
 pub fn log_ratio(a: &[Slice<[f32; 3]>], b: &[Slice<[f32; 3]>]) -> Vec<Slice<f32>> {
     let ratio = |(a, b): (&[f32; 3], &[f32; 3])| {
-        let logs = [0, 1, 2].map(|c| (a[c].max(1e-9) / b[c].max(1e-9)).ln());
+        let logs = [0, 1, 2].map(|c| (a[c].max(1e-9) / b[c].max(1e-9)).natural_log());
         (logs[0] + logs[1] + logs[2]) / 3.0
     };
     a.iter()

@@ -1,6 +1,7 @@
 //! The spans of polar angle within one frame, as the paper's Fig. 3: eqs. (1) and (2).
 
 use gonia_brdf::Direction;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::local_direction;
 use gonia_render::svg;
 use gonia_rig::Rig;
@@ -11,7 +12,7 @@ fn span_deg(theta_deg: f64, distance_m: f64, radius_m: f64) -> [f64; 2] {
     let arm = Direction::from_deg(theta_deg, 0.0);
     [radius_m, -radius_m].map(|x| {
         let d = local_direction(arm, distance_m, [x, 0.0]);
-        d[0].atan2(d[2]).to_degrees() - theta_deg
+        d[0].arc_tangent2(d[2]).to_degrees() - theta_deg
     })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::{CameraGeometry, Homography};
 use gonia_brdf::Direction;
+use gonia_brdf::Elementary;
 use nalgebra::{Matrix3, Rotation2};
 
 /// Intrinsics and distance of the camera. *Ideal* pixels are those of a pinhole; a lens with radial
@@ -54,10 +55,10 @@ impl CameraModel {
     /// The map from millimetres on the target to ideal pixels, for a camera that looks at the
     /// centre from `view`: image up is −∂d/∂θ, image right (−sin φ, cos φ, 0).
     pub fn predict(&self, view: Direction, by: CameraShift) -> Homography {
-        let (st, ct) = (view.theta + by.theta).sin_cos();
-        let (sp, cp) = (view.phi + by.phi).sin_cos();
+        let (st, ct) = (view.theta + by.theta).sine_cosine();
+        let (sp, cp) = (view.phi + by.phi).sine_cosine();
         let turn = Rotation2::new(by.roll);
-        let focal = self.focal_px * by.log_scale.exp();
+        let focal = self.focal_px * by.log_scale.exponential();
         let image = |right: f64, down: f64| turn * nalgebra::Vector2::new(right, down) * focal;
         // Columns: where a step along x, a step along y and the centre go; the last row is depth.
         let (x, y) = (image(-sp, ct * cp), image(cp, ct * sp));
@@ -146,7 +147,7 @@ mod tests {
         let camera = CameraModel::new(&rig.camera);
         for ideal in [[512.0, 512.0], [30.0, 900.0], [1000.0, 10.0]] {
             let back = camera.undistort(camera.distort(ideal));
-            assert!((back[0] - ideal[0]).hypot(back[1] - ideal[1]) < 1e-4);
+            assert!((back[0] - ideal[0]).hypotenuse(back[1] - ideal[1]) < 1e-4);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Maps between the target's plane and an image without distortion.
 
+use gonia_brdf::Elementary;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// A projective map of the plane. `pixel_from_target` takes millimetres on the target to pixels.
@@ -69,7 +70,7 @@ fn normalised(points: &[[f64; 2]; 4]) -> Option<([[f64; 2]; 4], Matrix3<f64>)> {
     let mean = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / 4.0);
     let spread = points
         .iter()
-        .map(|p| (p[0] - mean[0]).hypot(p[1] - mean[1]))
+        .map(|p| (p[0] - mean[0]).hypotenuse(p[1] - mean[1]))
         .sum::<f64>()
         / 4.0;
     if !(spread > 0.0 && spread.is_finite()) {
@@ -102,9 +103,9 @@ mod tests {
             let back = map.inverse().unwrap();
             for i in 0..4 {
                 let image = map.apply(from[i]);
-                prop_assert!((image[0] - to[i][0]).hypot(image[1] - to[i][1]) < 1e-9);
+                prop_assert!((image[0] - to[i][0]).hypotenuse(image[1] - to[i][1]) < 1e-9);
                 let again = back.apply(image);
-                prop_assert!((again[0] - from[i][0]).hypot(again[1] - from[i][1]) < 1e-7);
+                prop_assert!((again[0] - from[i][0]).hypotenuse(again[1] - from[i][1]) < 1e-7);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The parts of the domain that figures are given for.
 
+use gonia_brdf::Elementary;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -85,7 +86,7 @@ pub fn of_geometry(theta_i_deg: f64, theta_v_deg: f64, cos_between: f64) -> Stra
         | bit(Stratum::Unmeasured, least > UNMEASURED_DEG + SLACK_DEG)
         | bit(
             Stratum::Retro,
-            cos_between > (RETRO_DEG - SLACK_DEG).to_radians().cos(),
+            cos_between > (RETRO_DEG - SLACK_DEG).to_radians().cosine(),
         )
 }
 
@@ -127,11 +128,11 @@ mod tests {
             assert_eq!(has(bits, Stratum::Unmeasured), unmeasured);
         }
         assert!(has(
-            of_geometry(0.0, 6.0, 6f64.to_radians().cos()),
+            of_geometry(0.0, 6.0, 6f64.to_radians().cosine()),
             Stratum::Retro
         ));
         assert!(!has(
-            of_geometry(0.0, 8.0, 8f64.to_radians().cos()),
+            of_geometry(0.0, 8.0, 8f64.to_radians().cosine()),
             Stratum::Retro
         ));
         for (k, stratum) in Stratum::ALL.into_iter().enumerate() {

@@ -1,6 +1,7 @@
 //! The light: a point source with a beam that is neither uniform nor centred.
 
 use super::optics::axes;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Direction, Vec3, dot};
 
 /// A smooth beam, Gaussian in the tangent of the angle off its own axis, which does not quite point
@@ -50,8 +51,8 @@ impl LightField {
             up,
             distance_m,
             beam: beam.map(|b| {
-                let axis = b.axis_deg.map(|a| a.to_radians().tan());
-                let scale = -0.5 / b.width_deg.to_radians().tan().powi(2);
+                let axis = b.axis_deg.map(|a| a.to_radians().tangent());
+                let scale = -0.5 / b.width_deg.to_radians().tangent().powi(2);
                 PreparedBeam {
                     axis,
                     scale,
@@ -83,7 +84,7 @@ impl LightField {
         let depth = self.distance_m - self.direction[0] * p[0] - self.direction[1] * p[1];
         let u = (self.right[0] * p[0] + self.right[1] * p[1]) / depth - beam.axis[0];
         let v = (self.up[0] * p[0] + self.up[1] * p[1]) / depth - beam.axis[1];
-        (beam.scale * (u * u + v * v) - beam.at_centre).exp()
+        (beam.scale * (u * u + v * v) - beam.at_centre).exponential()
     }
 }
 
@@ -98,7 +99,7 @@ mod tests {
         let point = LightField::new(1.1, Direction::from_deg(60.0, 0.0), None);
         assert!((point.at([0.0; 2]).1 - 0.5).abs() < 1e-12);
         // Straight below the light: closer and at normal incidence.
-        let below = 1.1 * 60f64.to_radians().sin();
+        let below = 1.1 * 60f64.to_radians().sine();
         assert!((point.at([below, 0.0]).1 - 4.0).abs() < 1e-9);
     }
 }

@@ -270,6 +270,7 @@ pub fn true_brdf(
 mod tests {
     use super::*;
     use gonia_brdf::Direction;
+    use gonia_brdf::Elementary;
     use gonia_brdf::model::Kurt;
 
     fn scene(px: usize) -> Scene {
@@ -297,7 +298,7 @@ mod tests {
         let centre = frame.rgb[200 * 401 + 200];
         let f = true_brdf(scene.material.as_ref(), &scene.geometry, at, [0.0; 2]);
         for c in 0..3 {
-            let measured = f64::from(centre[c]) / at.light.theta.cos();
+            let measured = f64::from(centre[c]) / at.light.theta.cosine();
             assert!((measured / f[c] - 1.0).abs() < 1e-6);
         }
     }

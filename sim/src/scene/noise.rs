@@ -1,5 +1,6 @@
 //! Shot and read noise of an HDR exposure.
 
+use gonia_brdf::Elementary;
 use std::sync::OnceLock;
 
 /// Noise relative to the typical radiance of a frame, for which its exposure is chosen.
@@ -76,7 +77,7 @@ fn normal_quantiles() -> &'static [f32; QUANTILES] {
         // Integrates the density outwards from the middle, by Newton steps on the quantile:
         // dx = dp / density at the middle of the step.
         let dp = 1.0 / QUANTILES as f64;
-        let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+        let density = |x: f64| (-0.5 * x * x).exponential() / std::f64::consts::TAU.sqrt();
         let half = QUANTILES / 2;
         let mut x = 0.0;
         for i in 0..half {

@@ -2,6 +2,7 @@
 
 use super::optics::Optics;
 use gonia_brdf::Direction;
+use gonia_brdf::Elementary;
 
 /// A ball at the light, and an arm that follows the light's meridian down to the desk.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +84,7 @@ impl Silhouette {
             ]
         })?;
         Some(Self {
-            radiance: occluder.brightness * light.theta.cos().max(0.0) / std::f64::consts::PI,
+            radiance: occluder.brightness * light.theta.cosine().max(0.0) / std::f64::consts::PI,
             parts,
             bounds,
         })

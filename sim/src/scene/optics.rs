@@ -1,6 +1,7 @@
 //! The pinhole camera on its arm.
 
 use super::SceneGeometry;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Direction, Vec3, dot};
 
 /// A camera at a pose: maps between pixels and the target's plane.
@@ -20,8 +21,8 @@ pub struct Optics {
 
 /// Image axes of something at `d` that looks at the centre: right (−sin φ, cos φ, 0) and up −∂d/∂θ.
 pub fn axes(d: Direction) -> (Vec3, Vec3) {
-    let (st, ct) = d.theta.sin_cos();
-    let (sp, cp) = d.phi.sin_cos();
+    let (st, ct) = d.theta.sine_cosine();
+    let (sp, cp) = d.phi.sine_cosine();
     ([-sp, cp, 0.0], [-ct * cp, -ct * sp, st])
 }
 
@@ -152,7 +153,7 @@ mod tests {
                     .project([point[0] * 1e-3, point[1] * 1e-3, 0.0])
                     .unwrap();
                 let back = optics.target_point_mm(pixel).unwrap();
-                assert!((back[0] - point[0]).hypot(back[1] - point[1]) < 1e-6);
+                assert!((back[0] - point[0]).hypotenuse(back[1] - point[1]) < 1e-6);
             }
         }
     }

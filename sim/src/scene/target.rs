@@ -2,6 +2,7 @@
 
 use super::SceneGeometry;
 use super::noise::mix;
+use gonia_brdf::Elementary;
 use std::f64::consts::PI;
 
 /// Albedo of the lines.
@@ -92,7 +93,7 @@ fn normal_cdf(x: f64) -> f64 {
         * (0.254_829_592
             + t * (-0.284_496_736
                 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
-    let upper = 0.5 * poly * (-z * z).exp();
+    let upper = 0.5 * poly * (-z * z).exponential();
     if x >= 0.0 { 1.0 - upper } else { upper }
 }
 

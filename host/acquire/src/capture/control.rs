@@ -1,6 +1,7 @@
 //! The control pose: taken again and again, so that a lamp that drifts or a sample that was moved is
 //! noticed.
 
+use gonia_brdf::Elementary;
 use gonia_imaging::LeftOut;
 use gonia_pipeline::process::{SampledFrame, SampledPoint};
 use std::fmt;
@@ -46,14 +47,14 @@ impl ControlComparison {
         let mut apart: Vec<f64> = ratios.iter().map(|r| (r / ratio - 1.0).abs()).collect();
         let offset = |frame: &SampledFrame| {
             let offset = frame.report.pose_offset;
-            let sin = frame.reading.view.theta.sin();
+            let sin = frame.reading.view.theta.sine();
             [offset.theta_deg, offset.phi_deg * sin]
         };
         let (a, b) = (offset(first), offset(now));
         Some(Self {
             ratio,
             scatter: 1.4826 * median(&mut apart)?,
-            moved_deg: (a[0] - b[0]).hypot(a[1] - b[1]),
+            moved_deg: (a[0] - b[0]).hypotenuse(a[1] - b[1]),
         })
     }
 

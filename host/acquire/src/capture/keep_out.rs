@@ -7,6 +7,7 @@
 //!
 //! Angles here are those of the axes: \[θ, φ\] in degrees, φ not wrapped, θ below 0 beyond the zenith.
 
+use gonia_brdf::Elementary;
 use std::collections::VecDeque;
 
 /// \[θ, φ\] of one arm.
@@ -114,13 +115,17 @@ fn nearest_deg(from: &ArmAngles, to: &ArmAngles) -> f64 {
             [low.min(deg), high.max(deg)]
         });
     // cos of the smallest and of the largest difference of azimuth, the short way round.
-    let near = turned_to(0.0, low, high).to_radians().cos();
-    let far = -turned_to(180.0, low, high).to_radians().cos();
+    let near = turned_to(0.0, low, high).to_radians().cosine();
+    let far = -turned_to(180.0, low, high).to_radians().cosine();
     let polar_angles = |arm: usize| {
         let (a, b) = (from[arm][0], to[arm][0]);
         let n = ((b - a).abs() / FINENESS_DEG).ceil().max(1.0) as usize;
         let last = if a == b { 0 } else { n };
-        (0..=last).map(move |i| (a + (b - a) * i as f64 / n as f64).to_radians().sin_cos())
+        (0..=last).map(move |i| {
+            (a + (b - a) * i as f64 / n as f64)
+                .to_radians()
+                .sine_cosine()
+        })
     };
     let mut most = -1.0f64;
     for (sin, cos) in polar_angles(0) {
@@ -131,7 +136,7 @@ fn nearest_deg(from: &ArmAngles, to: &ArmAngles) -> f64 {
             most = most.max(cos * other_cos + across * azimuth);
         }
     }
-    most.clamp(-1.0, 1.0).acos().to_degrees()
+    most.clamp(-1.0, 1.0).arc_cosine().to_degrees()
 }
 
 /// How near to `deg`, in whatever turn, the angles from `low` to `high` come.

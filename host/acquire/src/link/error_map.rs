@@ -1,6 +1,7 @@
 //! The encoder's error map from readings against a reference: a least-squares fit of two harmonics.
 //! What the map is stands in `gonia_firmware::error_map`.
 
+use gonia_brdf::Elementary;
 use nalgebra::{DMatrix, DVector};
 
 /// Readings over less than this cannot tell two harmonics apart: one is fitted, degrees.
@@ -68,8 +69,8 @@ pub fn fit_error_map(readings: &[Reading], zero_deg: f64) -> Result<ErrorMapFit,
         let angle = harmonic * place_deg.to_radians();
         match column {
             0 => 1.0,
-            odd if odd % 2 == 1 => angle.cos(),
-            _ => angle.sin(),
+            odd if odd % 2 == 1 => angle.cosine(),
+            _ => angle.sine(),
         }
     };
     let matrix = DMatrix::from_fn(readings.len(), unknowns, |row, column| {
@@ -125,7 +126,8 @@ mod tests {
 
     #[test]
     fn a_map_is_found_again() {
-        let error = |p: f64| 0.007 + 0.05 * p.sin() - 0.02 * p.cos() + 0.003 * (2.0 * p).cos();
+        let error =
+            |p: f64| 0.007 + 0.05 * p.sine() - 0.02 * p.cosine() + 0.003 * (2.0 * p).cosine();
         let fit = fit_error_map(&readings(24, 360.0, error), 0.0).unwrap();
         assert_eq!(fit.amplitudes_udeg, [-20_000, 50_000, 3_000, 0]);
         assert!((fit.zero_off_deg - error(0.0)).abs() < 1e-9);
@@ -134,7 +136,7 @@ mod tests {
 
     #[test]
     fn over_a_quarter_of_a_turn_one_harmonic_is_fitted() {
-        let error = |p: f64| 0.05 * (p + 0.3).sin();
+        let error = |p: f64| 0.05 * (p + 0.3).sine();
         let fit = fit_error_map(&readings(10, 90.0, error), 0.0).unwrap();
         assert_eq!(fit.amplitudes_udeg[2..], [0, 0]);
         assert!(fit.rms_after_deg < 1e-6, "{fit:?}");
@@ -142,7 +144,7 @@ mod tests {
 
     #[test]
     fn too_few_too_close_and_too_large_are_refused() {
-        let few = fit_error_map(&readings(5, 90.0, f64::sin), 0.0);
+        let few = fit_error_map(&readings(5, 90.0, f64::sine), 0.0);
         let needed = 6;
         assert_eq!(few, Err(MapFitError::TooFew { given: 5, needed }));
         assert_eq!(
@@ -150,7 +152,7 @@ mod tests {
             Err(MapFitError::TooClose)
         );
         assert!(matches!(
-            fit_error_map(&readings(24, 360.0, |p| 3.0 * p.sin()), 0.0),
+            fit_error_map(&readings(24, 360.0, |p| 3.0 * p.sine()), 0.0),
             Err(MapFitError::TooLarge(_))
         ));
     }

@@ -2,6 +2,7 @@
 //! should be: a least-squares fit of one harmonic. What it is for stands in
 //! `gonia_firmware::error_map`.
 
+use gonia_brdf::Elementary;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -36,7 +37,7 @@ pub fn fit_gear_map(readings: &[GearReading], worm_turn_deg: f64) -> Option<Gear
     }
     let matrix = DMatrix::from_fn(readings.len(), 3, |row, column| {
         let phase = TAU * readings[row].shaft_deg / worm_turn_deg;
-        [1.0, phase.cos(), phase.sin()][column]
+        [1.0, phase.cosine(), phase.sine()][column]
     });
     let ahead = DVector::from_iterator(readings.len(), readings.iter().map(|r| r.ahead_deg));
     let svd = matrix.clone().svd(true, true);
@@ -67,7 +68,7 @@ mod tests {
             let phase = TAU * shaft_deg / 4.0;
             GearReading {
                 shaft_deg,
-                ahead_deg: 0.2 + 0.002 * phase.cos() - 0.003 * phase.sin(),
+                ahead_deg: 0.2 + 0.002 * phase.cosine() - 0.003 * phase.sine(),
             }
         };
         (0..24).map(reading).collect()

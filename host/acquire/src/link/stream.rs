@@ -2,7 +2,6 @@
 //! is lost while the host computes.
 
 use std::io::{self, Read, Write};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
@@ -34,7 +33,7 @@ impl StreamTransport {
 
     /// Connects to a Unix socket.
     #[cfg(unix)]
-    pub fn open_unix(path: &Path) -> io::Result<Self> {
+    pub fn open_unix(path: &std::path::Path) -> io::Result<Self> {
         let socket = std::os::unix::net::UnixStream::connect(path)?;
         socket.set_read_timeout(Some(READ_TIMEOUT))?;
         Self::start(socket.try_clone()?, socket)

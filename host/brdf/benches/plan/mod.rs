@@ -1,5 +1,6 @@
 //! What the benches measure: analytic materials, seen by the paper's plan on the paper's rig.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::{directions, paper_lights, paper_views};
 use gonia_brdf::model::{Ggx, Kurt, KurtLobe, Material, Ward};
@@ -122,7 +123,7 @@ pub fn measure_with(model: &dyn Brdf, noise: f64, poses: &Poses) -> Vec<Sample> 
     let (lights, views) = (&poses.lights, &poses.views);
     let points: Vec<[f64; 2]> = (-19..=19)
         .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
-        .filter(|p| p[0].hypot(p[1]) <= 0.277)
+        .filter(|p| p[0].hypotenuse(p[1]) <= 0.277)
         .collect();
     (0..lights.len() * views.len())
         .into_par_iter()

@@ -1,5 +1,6 @@
 //! Radial basis functions.
 
+use crate::elementary::Elementary;
 use crate::interpolate::Matern32;
 
 /// A radial basis function of the distance r. Those without a length are homogeneous: scaling all
@@ -77,13 +78,13 @@ impl BasisFunction {
             // r² ln r → 0 as r → 0.
             BasisFunction::ThinPlate => {
                 if r > 0.0 {
-                    r * r * r.ln()
+                    r * r * r.natural_log()
                 } else {
                     0.0
                 }
             }
             BasisFunction::Cubic => r * r * r,
-            BasisFunction::Gaussian => (-s * s).exp(),
+            BasisFunction::Gaussian => (-s * s).exponential(),
             BasisFunction::Multiquadric => -(1.0 + s * s).sqrt(),
             BasisFunction::Wendland => (1.0 - s).max(0.0).powi(6) * (6.0 * s + 1.0),
             BasisFunction::Matern => Matern32::of(3f64.sqrt() * s),
@@ -99,9 +100,12 @@ mod tests {
     fn kernels_have_their_values_at_zero_and_at_their_length() {
         let at = |k: BasisFunction| (k.value(0.0, 2.0), k.value(2.0, 2.0));
         assert_eq!(at(BasisFunction::Linear), (0.0, -2.0));
-        assert_eq!(at(BasisFunction::ThinPlate), (0.0, 4.0 * 2f64.ln()));
+        assert_eq!(
+            at(BasisFunction::ThinPlate),
+            (0.0, 4.0 * 2f64.natural_log())
+        );
         assert_eq!(at(BasisFunction::Cubic), (0.0, 8.0));
-        assert_eq!(at(BasisFunction::Gaussian), (1.0, (-1f64).exp()));
+        assert_eq!(at(BasisFunction::Gaussian), (1.0, (-1f64).exponential()));
         assert_eq!(at(BasisFunction::Multiquadric), (-1.0, -(2f64.sqrt())));
         assert_eq!(at(BasisFunction::Wendland), (1.0, 0.0));
         assert_eq!(BasisFunction::Wendland.value(3.0, 2.0), 0.0);

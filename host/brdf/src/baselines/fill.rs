@@ -212,6 +212,7 @@ fn mirror(n: usize, plane: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elementary::Elementary;
     use crate::model::{Brdf, Kurt};
     use crate::progress::silent;
     use crate::sample::Sample;
@@ -273,7 +274,7 @@ mod tests {
                         grid.direction(light).to_vec3(),
                         grid.direction(view).to_vec3(),
                     );
-                    let off = (f64::from(value[1]) / truth[1]).ln().abs();
+                    let off = (f64::from(value[1]) / truth[1]).natural_log().abs();
                     // A node of 30° is far from its neighbours; the nearest may be 40° away.
                     assert!(off < 0.25, "{name}: {off} at {light}, {view}");
                 }

@@ -6,6 +6,7 @@ use super::system::System;
 use super::{Failure, Interpolant};
 use crate::bins::Bins;
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use crate::interpolate::FillError;
 use crate::interpolate::fill::MIN_BINS;
 
@@ -75,7 +76,7 @@ impl<'a> Predictor<'a> {
         let value = match self.settings.values {
             Transform::Linear => value,
             // A NaN stays one.
-            Transform::Logarithm => value.map(|v| v.clamp(-LOG_LIMIT, LOG_LIMIT).exp()),
+            Transform::Logarithm => value.map(|v| v.clamp(-LOG_LIMIT, LOG_LIMIT).exponential()),
         };
         // As the single-precision number that it will be.
         if value.iter().all(|v| (*v as f32).is_finite()) {
@@ -91,7 +92,7 @@ impl<'a> Predictor<'a> {
         let value = work.near.values.first().copied().unwrap_or_default();
         match self.settings.values {
             Transform::Linear => value,
-            Transform::Logarithm => value.map(f64::exp),
+            Transform::Logarithm => value.map(f64::exponential),
         }
     }
 }

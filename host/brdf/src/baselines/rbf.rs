@@ -71,6 +71,7 @@ impl Interpolant for Rbf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elementary::Elementary;
     use nalgebra::{DMatrix, DVector};
 
     /// Evenly scattered in six dimensions, all within a radius of about 1.
@@ -79,7 +80,7 @@ mod tests {
         let steps = [0.8987, 0.8077, 0.7259, 0.6524, 0.5863, 0.5269];
         for k in 1..=n {
             let at = steps.map(|a| (k as f64 * a).fract() - 0.5);
-            let value = (2.0 * at[0]).sin() + at[3] * at[4];
+            let value = (2.0 * at[0]).sine() + at[3] * at[4];
             near.push(at, [value, 1.0 + value, -3.0 * value]);
         }
         near

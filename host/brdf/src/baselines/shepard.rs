@@ -1,6 +1,7 @@
 //! Shepard's method (1968): a mean weighted by inverse distance.
 
 use super::{Failure, Interpolant, Neighbourhood, System};
+use crate::elementary::Elementary;
 
 /// Mean with the weights r^−power.
 pub struct Shepard {
@@ -20,7 +21,7 @@ impl Interpolant for Shepard {
         let mut total = 0.0;
         for (value, distance) in near.values.iter().zip(&near.distances) {
             // Relative to the nearest one, so that no power can overflow.
-            let weight = (nearest / distance).powf(self.power);
+            let weight = (nearest / distance).power(self.power);
             total += weight;
             for c in 0..3 {
                 sum[c] += weight * value[c];

@@ -3,6 +3,7 @@
 mod node;
 mod noise;
 
+use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::quantile::median;
 use crate::sample::Sample;
@@ -124,7 +125,7 @@ impl Bins {
             .noise_variance
             .map_or(0.0, |v| v.min(NOISE_MAX * NOISE_MAX));
         let of_bin = variance * variance_of_median(bin.count) / bin.count.max(1) as f32;
-        bin.median[channel].max(floor).ln() + 0.5 * of_bin
+        bin.median[channel].max(floor).natural_log() + 0.5 * of_bin
     }
 
     /// How many samples fell outside the grid.
@@ -353,7 +354,7 @@ mod tests {
             let bins = Bins::new(Grid::PAPER, &samples);
             let of_count = bins.bins().iter().filter(|b| b.count == count as u32);
             let logs: Vec<f32> = of_count
-                .map(|b| bins.log_value(b, 0, 1e-3) - 3f32.ln())
+                .map(|b| bins.log_value(b, 0, 1e-3) - 3f32.natural_log())
                 .collect();
             let mean = logs.iter().sum::<f32>() / logs.len() as f32;
             assert!(logs.len() > 20_000 && mean.abs() < 0.004, "{count}: {mean}");

@@ -1,6 +1,7 @@
 //! Means of directions about a node, without a sine a sample.
 
 use crate::direction::{normalize, wrap_deg};
+use crate::elementary::Elementary;
 use crate::grid::Grid;
 
 /// Sine and cosine of the nodes' angles. A sample lies within half a step of its node, so that a
@@ -22,7 +23,7 @@ impl Nodes {
     pub fn new(grid: Grid) -> Self {
         let at = |k: usize| {
             let deg = k as f64 * grid.step_deg();
-            let (sin, cos) = deg.to_radians().sin_cos();
+            let (sin, cos) = deg.to_radians().sine_cosine();
             NodeAngle { deg, sin, cos }
         };
         Self {
@@ -66,7 +67,7 @@ impl Node<'_> {
             }
             // Around the pole azimuths are anywhere.
             let (sp, cp) = if self.is_pole {
-                let (s, c) = d_phi.to_radians().sin_cos();
+                let (s, c) = d_phi.to_radians().sine_cosine();
                 (s as f32, (c - 1.0) as f32)
             } else {
                 small_turn(d_phi)

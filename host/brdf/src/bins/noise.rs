@@ -4,6 +4,7 @@
 //! where highlights are narrow: a material of nothing but narrow highlights would seem to be noisy.
 
 use crate::direction::Direction;
+use crate::elementary::Elementary;
 use crate::quantile::quantile;
 use crate::sample::Sample;
 
@@ -33,7 +34,8 @@ pub fn variances_about_plane(group: &[Sample]) -> Option<[f32; 3]> {
     let mut columns: Vec<Vec<f64>> = (0..COLUMNS)
         .map(|k| centred(places.iter().map(|p| p[k])))
         .collect();
-    let mut values = [0, 1, 2].map(|c| centred(group.iter().map(|s| f64::from(s.rgb[c]).ln())));
+    let mut values =
+        [0, 1, 2].map(|c| centred(group.iter().map(|s| f64::from(s.rgb[c]).natural_log())));
     // Gram and Schmidt, the widest direction first.
     let mut freedom = group.len() - 1;
     let mut widest = ROUNDING / SPREAD_MIN;
@@ -99,8 +101,9 @@ mod tests {
         (0..count)
             .map(|_| {
                 let [x, y] = [(); 2].map(|()| random.between(-1.0, 1.0) as f32);
-                let rgb = [0, 1, 2]
-                    .map(|_| (slope * (x + 0.5 * y) + noise * random.normal() as f32).exp());
+                let rgb = [0, 1, 2].map(|_| {
+                    (slope * (x + 0.5 * y) + noise * random.normal() as f32).exponential()
+                });
                 Sample {
                     theta_i_deg: 40.0 + x,
                     phi_i_deg: 100.0 + 1.5 * y,

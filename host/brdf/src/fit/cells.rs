@@ -3,6 +3,7 @@
 use crate::bins::Bins;
 use crate::dense::DenseBrdf;
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use crate::random::Random;
 
 /// With both polar angles beyond this nothing can be measured, and nothing is fitted.
@@ -27,9 +28,9 @@ pub fn draw(dense: &DenseBrdf, count: usize, seed: u64) -> Vec<Cell> {
     let grid = dense.grid();
     let mut random = Random::new(seed);
     let theta_max = (grid.n_theta() - 1) as f64 * grid.step_deg();
-    let least_cosine = theta_max.to_radians().cos();
+    let least_cosine = theta_max.to_radians().cosine();
     let mut node = |theta_limit: f64| loop {
-        let theta = random.between(least_cosine, 1.0).acos().to_degrees();
+        let theta = random.between(least_cosine, 1.0).arc_cosine().to_degrees();
         let phi = random.between(0.0, 360.0);
         if let Some(node) = grid.nearest(theta, phi)
             && theta <= theta_limit
@@ -114,7 +115,7 @@ mod tests {
         assert!((1500..=2000).contains(&cells.len()), "{}", cells.len());
         let bright = cells.iter().filter(|cell| cell.value[1] > 0.1).count();
         assert!(bright > cells.len() / 5, "{bright}");
-        let least = UNMEASURED_DEG.to_radians().cos() - 1e-9;
+        let least = UNMEASURED_DEG.to_radians().cosine() - 1e-9;
         assert!(cells.iter().all(|c| c.light[2].max(c.view[2]) >= least));
         assert_eq!(draw(&dense, 2000, 1), cells);
     }

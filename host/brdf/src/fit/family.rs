@@ -1,6 +1,7 @@
 //! What can be fitted: a family of models, which differ by the values of named parameters.
 
 use super::range::Range;
+use crate::elementary::Elementary;
 use crate::model::Brdf;
 use crate::random::Random;
 use std::ops::Deref;
@@ -116,7 +117,9 @@ impl Parameter {
     pub(super) fn draw(&self, random: &mut Random) -> f64 {
         let (low, high) = self.start;
         match self.range {
-            Range::Logarithmic(..) => random.between(low.ln(), high.ln()).exp(),
+            Range::Logarithmic(..) => random
+                .between(low.natural_log(), high.natural_log())
+                .exponential(),
             _ => random.between(low, high),
         }
     }

@@ -17,6 +17,7 @@ pub use family::{ModelFamily, Parameter, ParameterValues};
 pub use range::Range;
 pub use standard::{StandardFamily, UnknownFamily};
 
+use crate::elementary::Elementary;
 use crate::model::Brdf;
 use crate::progress::Progress;
 use crate::random::Random;
@@ -258,7 +259,9 @@ impl<'a> Problem<'a> {
             let f = model.eval(cell.light, cell.view);
             let cosines = cell.light[2] * cell.view[2] / self.mean;
             out.extend((0..3).map(|c| match self.loss {
-                Loss::Logarithm => ((f[c] + floor) / (cell.value[c].max(0.0) + floor)).ln(),
+                Loss::Logarithm => {
+                    ((f[c] + floor) / (cell.value[c].max(0.0) + floor)).natural_log()
+                }
                 Loss::Cosine => (f[c] - cell.value[c]) * cosines,
             }));
         }

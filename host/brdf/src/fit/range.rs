@@ -1,6 +1,8 @@
 //! Ranges of parameters, and the free numbers that stand for them: a bounded parameter is a smooth
 //! function of an unbounded one, so that least squares need not know of bounds.
 
+use crate::elementary::Elementary;
+
 /// What values a parameter may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
@@ -22,7 +24,7 @@ impl Range {
     pub fn of_free(self, free: f64) -> f64 {
         match self {
             Range::Azimuth => free * AZIMUTH_STEP_DEG,
-            _ => self.at_share(1.0 / (1.0 + (-free).exp())),
+            _ => self.at_share(1.0 / (1.0 + (-free).exponential())),
         }
     }
 
@@ -32,7 +34,7 @@ impl Range {
             Range::Azimuth => value / AZIMUTH_STEP_DEG,
             _ => {
                 let share = self.share_of(value).clamp(EDGE, 1.0 - EDGE);
-                (share / (1.0 - share)).ln()
+                (share / (1.0 - share)).natural_log()
             }
         }
     }
@@ -41,7 +43,7 @@ impl Range {
     pub fn at_share(self, share: f64) -> f64 {
         match self {
             Range::Linear(low, high) => low + share * (high - low),
-            Range::Logarithmic(low, high) => low * (high / low).powf(share),
+            Range::Logarithmic(low, high) => low * (high / low).power(share),
             Range::Azimuth => 180.0 * share,
         }
     }
@@ -49,7 +51,9 @@ impl Range {
     fn share_of(self, value: f64) -> f64 {
         match self {
             Range::Linear(low, high) => (value - low) / (high - low),
-            Range::Logarithmic(low, high) => (value.max(low) / low).ln() / (high / low).ln(),
+            Range::Logarithmic(low, high) => {
+                (value.max(low) / low).natural_log() / (high / low).natural_log()
+            }
             Range::Azimuth => value / 180.0,
         }
     }

@@ -135,6 +135,7 @@ fn factor_panel<S: Simd>(simd: S, panel: &mut [f32], rows: usize, j: usize, firs
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elementary::Elementary;
     use pulp::{Arch, WithSimd};
 
     struct Factor<'a>(&'a mut Columns, usize);
@@ -152,7 +153,7 @@ mod tests {
         for j in 0..n {
             for i in 0..n {
                 let d = (i as f32 - j as f32).abs() / n as f32;
-                m.column_mut(j)[i] = (-d).exp() + if i == j { diagonal } else { 0.0 };
+                m.column_mut(j)[i] = (-d).exponential() + if i == j { diagonal } else { 0.0 };
             }
             for extra in 0..16 {
                 m.column_mut(j)[n + extra] = ((j + extra) % 7) as f32;

@@ -4,6 +4,7 @@
 //! reciprocal BRDF is even in it, and mirrored samples lie where they belong.
 
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 
 /// A point of the six-dimensional embedding.
 pub type Point = [f32; 6];
@@ -61,7 +62,7 @@ impl Coordinates {
             0.0 => 1.0,
             0.25 => x.sqrt().sqrt(),
             1.0 => x,
-            exponent => x.powf(exponent),
+            exponent => x.power(exponent),
         }
     }
 
@@ -75,7 +76,7 @@ impl Coordinates {
             // |i + v|² + |i − v|² = 4.
             let length2: f32 = difference.iter().map(|d| d * d).sum();
             let half2 = (1.0 - 0.5 / (to.weight * to.weight) as f32 * length2).max(2.5e-7);
-            half2.powf(0.5 * (to.exponent - self.exponent) as f32)
+            half2.power(0.5 * (to.exponent - self.exponent) as f32)
         };
         let [x, y, z] = [point[0] * scale, point[1] * scale, point[2] * scale];
         [x, y, z, difference[0], difference[1], difference[2]]
@@ -134,7 +135,7 @@ impl Drift {
         -0.25
             * (1.0 - self.per_difference2 * difference2)
                 .max(COS2_MIN)
-                .ln()
+                .natural_log()
     }
 }
 
@@ -201,7 +202,7 @@ mod tests {
         let point = |c: &Coordinates| c.point(i.to_vec3(), v.to_vec3());
         for weight in [0.25, 0.5] {
             let c = Coordinates::half_difference(weight);
-            let expected = -0.5 * 60f64.to_radians().cos().ln();
+            let expected = -0.5 * 60f64.to_radians().cosine().natural_log();
             assert!((f64::from(c.drift().at(&point(&c))) - expected).abs() < 1e-5);
         }
         let c = Coordinates::sum_difference(0.5);

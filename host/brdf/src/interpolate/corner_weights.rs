@@ -4,6 +4,7 @@
 //! as a polynomial through as many points as there are, wherever they lie.
 
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use nalgebra::{DMatrix, DVector};
 
 /// Range of the kernel in radii of the patch. With 2 even a linear function was off by a hundredth of its range.
@@ -34,7 +35,8 @@ impl Weights {
         let radius2 = corners
             .iter()
             .fold(0.0, |r: f64, c| r.max(distance2(*c, centre)));
-        let kernel = |a: Vec3, b: Vec3| (-distance2(a, b) / (RANGE * RANGE * radius2)).exp();
+        let kernel =
+            |a: Vec3, b: Vec3| (-distance2(a, b) / (RANGE * RANGE * radius2)).exponential();
         let n = corners.len();
         let matrix = DMatrix::from_fn(n, n, |i, j| {
             kernel(corners[i], corners[j]) + if i == j { NUGGET } else { 0.0 }

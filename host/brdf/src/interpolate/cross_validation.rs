@@ -10,6 +10,7 @@ use super::patches::{Patch, cover};
 use super::refine::Refiner;
 use crate::bins::{Bin, Bins};
 use crate::direction::{Direction, Vec3};
+use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::sample::Sample;
 use rayon::prelude::*;
@@ -257,7 +258,7 @@ fn cluster(bin: &Bin) -> u32 {
     let part = |v: [f32; 3]| {
         let d = Direction::from_vec3(v.map(f64::from));
         let ring = (d.theta_deg() / CLUSTER_DEG).round();
-        let around = (360.0 * (ring * CLUSTER_DEG).to_radians().sin() / CLUSTER_DEG).max(1.0);
+        let around = (360.0 * (ring * CLUSTER_DEG).to_radians().sine() / CLUSTER_DEG).max(1.0);
         let column = (d.phi_deg() / 360.0 * around).floor();
         (64.0 * ring + column) as u32
     };

@@ -15,6 +15,7 @@ use super::datum::SIGMA_PER_MAD;
 use crate::bins::{Bin, variance_of_median};
 use crate::dense::DenseBrdf;
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use crate::quantile::quantile;
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
@@ -139,7 +140,7 @@ impl Calibration {
     }
 
     fn part(&self, light: Vec3, view: Vec3, log: [f32; 3]) -> usize {
-        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cos();
+        let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
         2 * usize::from(grazing) + usize::from(mean(log) > self.bright)
     }
 

@@ -67,6 +67,7 @@ fn exponential<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elementary::Elementary;
 
     #[test]
     fn exponentials_are_right_to_single_precision_and_bounded() {
@@ -82,7 +83,7 @@ mod tests {
                     Exponentials(values.as_flattened_mut()).with_simd(pulp::Scalar);
                 }
                 for (value, log) in values.as_flattened().iter().zip(logs.as_flattened()) {
-                    let truth = f64::from(*log).clamp(-60.0, 60.0).exp();
+                    let truth = f64::from(*log).clamp(-60.0, 60.0).exponential();
                     let off = f64::from(*value) / truth - 1.0;
                     assert!(off.abs() < 3e-7, "{log}: {off}");
                 }

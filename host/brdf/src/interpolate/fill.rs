@@ -207,6 +207,7 @@ mod tests {
     use super::*;
     use crate::bins::Bins;
     use crate::direction::Direction;
+    use crate::elementary::Elementary;
     use crate::model::{Brdf, Kurt};
     use crate::progress::silent;
     use crate::sample::Sample;
@@ -222,10 +223,10 @@ mod tests {
             }
             x
         };
-        let cos_max = 87f64.to_radians().cos();
+        let cos_max = 87f64.to_radians().cosine();
         (1..=n)
             .map(|k| {
-                let theta = |u: f64| (1.0 - u * (1.0 - cos_max)).acos().to_degrees();
+                let theta = |u: f64| (1.0 - u * (1.0 - cos_max)).arc_cosine().to_degrees();
                 let light = Direction::from_deg(theta(halton(k, 2)), 360.0 * halton(k, 3));
                 let view = Direction::from_deg(theta(halton(k, 5)), 360.0 * halton(k, 7));
                 Sample::new(
@@ -267,7 +268,7 @@ mod tests {
                     grid.direction(light).to_vec3(),
                     grid.direction(view).to_vec3(),
                 );
-                sum += (f64::from(value[1]) / truth[1]).ln().powi(2);
+                sum += (f64::from(value[1]) / truth[1]).natural_log().powi(2);
             }
         }
         let rms = (sum / (n * n) as f64).sqrt();

@@ -185,13 +185,14 @@ fn row_of_cells<S: Simd, const R: usize>(
 mod tests {
     use super::*;
     use crate::direction::{Vec3, dot};
+    use crate::elementary::Elementary;
     use crate::grid::Grid;
     use crate::interpolate::patches::cover;
 
     /// A function of two directions that is not a polynomial of them.
     fn smooth(light: Vec3, view: Vec3) -> [f32; 3] {
         let x = dot(light, view) + 0.3 * light[0] - 0.2 * view[1] * view[2];
-        [x.sin(), (1.5 * x).exp(), x * x].map(|v| v as f32)
+        [x.sine(), (1.5 * x).exponential(), x * x].map(|v| v as f32)
     }
 
     fn kinked(light: Vec3, view: Vec3) -> [f32; 3] {

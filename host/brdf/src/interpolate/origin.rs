@@ -2,6 +2,7 @@
 
 use crate::bins::Bins;
 use crate::direction::{Vec3, dot};
+use crate::elementary::Elementary;
 use crate::grid::Grid;
 use rayon::prelude::*;
 
@@ -73,7 +74,7 @@ fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
         .filter(|d| measured[*d])
         .map(vector)
         .collect();
-    let closest = GAP_DEG.to_radians().cos();
+    let closest = GAP_DEG.to_radians().cosine();
     (0..measured.len())
         .into_par_iter()
         .map(|d| {

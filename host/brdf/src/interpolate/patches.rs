@@ -7,6 +7,7 @@
 
 use super::corner_weights::Weights;
 use crate::direction::{Direction, Vec3, normalize};
+use crate::elementary::Elementary;
 use crate::grid::Grid;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -88,7 +89,7 @@ fn divide(grid: Grid, rows: Range<usize>, columns: Range<usize>, sizes_deg: &[f6
         let n_around = if first == 0 {
             1
         } else {
-            let width_deg = columns.len() as f64 * step * middle_deg.to_radians().sin();
+            let width_deg = columns.len() as f64 * step * middle_deg.to_radians().sine();
             ((width_deg / size_deg).round() as usize).clamp(1, columns.len())
         };
         for k in 0..n_around {

@@ -8,6 +8,7 @@ use super::data::{Data, MANY_BINS};
 use super::patches::cover;
 use super::{FillSettings, Preset};
 use crate::bins::Bins;
+use crate::elementary::Elementary;
 
 /// A fold leaves out one frame in so many.
 const ONE_IN: u32 = 24;
@@ -130,11 +131,11 @@ impl<'a> Comparison<'a> {
             .map(|p| {
                 let residuals = p.residual.iter().flatten();
                 let errors = residuals.map(|r| f64::from(r.abs().min(RESIDUAL_MAX)));
-                errors.map(|e| e.powf(self.exponent)).sum::<f64>() / 3.0
+                errors.map(|e| e.power(self.exponent)).sum::<f64>() / 3.0
             })
             .collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        (!errors.is_empty()).then(|| mean.powf(1.0 / self.exponent))
+        (!errors.is_empty()).then(|| mean.power(1.0 / self.exponent))
     }
 }
 
@@ -144,5 +145,5 @@ const RESIDUAL_MAX: f32 = 1.0;
 /// Whether both polar angles are below [`INTERIOR_DEG`].
 fn is_interior(prediction: &Prediction) -> bool {
     let lowest = prediction.bin.light[2].min(prediction.bin.view[2]);
-    f64::from(lowest) >= INTERIOR_DEG.to_radians().cos()
+    f64::from(lowest) >= INTERIOR_DEG.to_radians().cosine()
 }

@@ -7,6 +7,7 @@
 
 use super::{Brdf, half_vector, schlick, turned};
 use crate::direction::{Vec3, dot};
+use crate::elementary::Elementary;
 use std::f64::consts::PI;
 
 /// One GGX lobe on a diffuse base. Positive and reciprocal; the lobe alone loses energy for
@@ -29,7 +30,7 @@ pub struct Ggx {
 
 impl Brdf for Ggx {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
-        let (s, c) = self.azimuth_deg.to_radians().sin_cos();
+        let (s, c) = self.azimuth_deg.to_radians().sine_cosine();
         let (light, view) = (turned(light, c, s), turned(view, c, s));
         let h = half_vector(light, view);
         let (ax2, ay2) = (self.alpha_x.powi(2), self.alpha_y.powi(2));

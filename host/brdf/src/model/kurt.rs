@@ -6,6 +6,7 @@
 
 use super::{Brdf, half_vector};
 use crate::direction::{Vec3, dot};
+use crate::elementary::Elementary;
 use std::f64::consts::PI;
 
 /// A diffuse base and any number of lobes. Reciprocal and positive.
@@ -50,7 +51,7 @@ impl Kurt {
             lobes: lobes
                 .iter()
                 .map(|l| {
-                    let (s, c) = l.azimuth_deg.to_radians().sin_cos();
+                    let (s, c) = l.azimuth_deg.to_radians().sine_cosine();
                     PreparedLobe {
                         scale: l.specular.map(|s| s / (4.0 * PI * l.mx * l.my)),
                         f0: l.f0,
@@ -114,7 +115,7 @@ impl Brdf for Kurt {
             let exponent = (hx * hx * lobe.inv_mx2 + hy * hy * lobe.inv_my2) * inv_cos2;
             let fresnel = lobe.f0 + (1.0 - lobe.f0) * schlick;
             // exp and the power share one call: the simulator evaluates this at every pixel.
-            let shape = (-exponent - lobe.alpha * cosines.ln()).exp();
+            let shape = (-exponent - lobe.alpha * cosines.natural_log()).exponential();
             let value = fresnel * shape * inv_cos2 * inv_cos2 / cos_d;
             for c in 0..3 {
                 f[c] += lobe.scale[c] * value;

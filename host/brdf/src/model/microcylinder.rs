@@ -15,6 +15,7 @@
 
 use super::Brdf;
 use crate::direction::{Vec3, dot};
+use crate::elementary::Elementary;
 use std::f64::consts::PI;
 
 /// Width of the transition from uncorrelated to correlated shadowing, radians: 20°.
@@ -86,7 +87,7 @@ impl Gaussian {
     }
 
     fn at(self, angle: f64) -> f64 {
-        self.peak * (self.scale * angle * angle).exp()
+        self.peak * (self.scale * angle * angle).exponential()
     }
 }
 
@@ -144,9 +145,9 @@ struct Seen {
 
 impl Prepared {
     fn new(thread: &Thread) -> Self {
-        let (s, c) = thread.azimuth_deg.to_radians().sin_cos();
+        let (s, c) = thread.azimuth_deg.to_radians().sine_cosine();
         let frames = thread.tilts_deg.iter().map(|tilt| {
-            let (up, along) = tilt.to_radians().sin_cos();
+            let (up, along) = tilt.to_radians().sine_cosine();
             ([c * along, s * along, up], [-c * up, -s * up, along])
         });
         Self {
@@ -181,9 +182,9 @@ impl Prepared {
             let (ci, cr) = (from_sine(si), from_sine(sr));
             let phi_d = angle_between(between - si * sr, ci * cr);
             let m = shadowing(ni / ci, nr / cr, phi_d);
-            let theta_h = 0.5 * (si.clamp(-1.0, 1.0).asin() + sr.clamp(-1.0, 1.0).asin());
+            let theta_h = 0.5 * (si.clamp(-1.0, 1.0).arc_sine() + sr.clamp(-1.0, 1.0).arc_sine());
             let cos2_d = (0.5 * (1.0 + ci * cr + si * sr)).max(1e-9);
-            let cos_half = (0.5 * phi_d).cos();
+            let cos_half = (0.5 * phi_d).cosine();
             let reflected = fresnel(self.index, cos2_d.sqrt() * cos_half);
             let surface = reflected * cos_half * self.surface.at(theta_h);
             let volume = (1.0 - reflected).powi(2)
@@ -211,13 +212,13 @@ fn from_sine(sine: f64) -> f64 {
 
 /// The angle, 0 ..= π, between two projected vectors from their product and that of their lengths.
 fn angle_between(product: f64, lengths: f64) -> f64 {
-    (product / lengths).clamp(-1.0, 1.0).acos()
+    (product / lengths).clamp(-1.0, 1.0).arc_cosine()
 }
 
 /// M, or P: two cosines (not negative) as independent, and where the angle between them is small as
 /// correlated.
 fn shadowing(cos_i: f64, cos_r: f64, difference: f64) -> f64 {
-    let u = (-0.5 * (difference / SHADOW_WIDTH).powi(2)).exp();
+    let u = (-0.5 * (difference / SHADOW_WIDTH).powi(2)).exponential();
     (1.0 - u) * cos_i * cos_r + u * cos_i.min(cos_r)
 }
 
@@ -240,7 +241,7 @@ mod tests {
         assert!((fresnel(1.5, 1.0) - 0.04).abs() < 1e-12);
         assert!((fresnel(1.5, 0.0) - 1.0).abs() < 1e-12);
         // At Brewster's angle half of s is left: ((n² − 1)/(n² + 1))²/2.
-        let brewster = 1.5f64.atan().cos();
+        let brewster = 1.5f64.arc_tangent().cosine();
         assert!((fresnel(1.5, brewster) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-12);
     }
 

@@ -52,6 +52,7 @@ fn schlick(f0: f64, cos: f64) -> f64 {
 mod checks {
     use super::Brdf;
     use crate::direction::{Direction, Vec3};
+    use crate::elementary::Elementary;
     use std::f64::consts::{FRAC_PI_2, TAU};
 
     /// Pairs of directions all over both hemispheres, the pole and 86° among them.
@@ -82,7 +83,7 @@ mod checks {
                 let view = Direction { theta, phi }.to_vec3();
                 let f = model.eval(light, view);
                 let projected =
-                    theta.sin() * view[2] * (FRAC_PI_2 / n_theta as f64) * (TAU / n_phi as f64);
+                    theta.sine() * view[2] * (FRAC_PI_2 / n_theta as f64) * (TAU / n_phi as f64);
                 for c in 0..3 {
                     sum[c] += f[c] * projected;
                 }

@@ -4,6 +4,7 @@
 
 use super::{Brdf, half_vector, turned};
 use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use std::f64::consts::PI;
 
 /// One Gaussian lobe on a diffuse base. Positive and reciprocal. The albedo of a narrow lobe is
@@ -24,12 +25,13 @@ pub struct Ward {
 
 impl Brdf for Ward {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
-        let (s, c) = self.azimuth_deg.to_radians().sin_cos();
+        let (s, c) = self.azimuth_deg.to_radians().sine_cosine();
         let h = turned(half_vector(light, view), c, s);
         let exponent =
             ((h[0] / self.alpha_x).powi(2) + (h[1] / self.alpha_y).powi(2)) / (h[2] * h[2]);
         let cosines = light[2].max(1e-9) * view[2].max(1e-9);
-        let value = (-exponent).exp() / (4.0 * PI * self.alpha_x * self.alpha_y * cosines.sqrt());
+        let value =
+            (-exponent).exponential() / (4.0 * PI * self.alpha_x * self.alpha_y * cosines.sqrt());
         [0, 1, 2].map(|c| self.diffuse[c] / PI + self.specular[c] * value)
     }
 }
@@ -52,7 +54,7 @@ mod tests {
         for theta_i in [0.0f64, 30.0, 60.0] {
             let albedo = checks::albedo(&model, theta_i, 50.0);
             for c in 0..3 {
-                let narrow = model.diffuse[c] + model.specular[c] * theta_i.to_radians().cos();
+                let narrow = model.diffuse[c] + model.specular[c] * theta_i.to_radians().cosine();
                 assert!(
                     (albedo[c] / narrow - 1.0).abs() < 0.02,
                     "{theta_i}: {albedo:?}"

@@ -1,5 +1,6 @@
 //! Drawings of the benches.
 
+use gonia_brdf::Elementary;
 use std::fmt::Write as _;
 
 /// A table of values as coloured cells with their numbers.
@@ -112,7 +113,7 @@ fn cells(svg: &mut String, heat: &Heat) {
 
 fn curves(svg: &mut String, line: &Line) {
     text(svg, 10.0, 16.0, "start", line.name);
-    let scale = |v: f64| if line.log { v.log10() } else { v };
+    let scale = |v: f64| if line.log { v.decimal_log() } else { v };
     let of = |f: fn(&(f64, f64)) -> f64| {
         let all = line.series.iter().flat_map(|s| &s.1).map(|p| scale(f(p)));
         let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
@@ -136,7 +137,7 @@ fn curves(svg: &mut String, line: &Line) {
     for share in [0.0, 0.5, 1.0] {
         let value = |(low, high): (f64, f64)| {
             let v = low + share * (high - low);
-            if line.log { 10f64.powf(v) } else { v }
+            if line.log { 10f64.power(v) } else { v }
         };
         let at = 40.0 + (WIDTH - 60.0) * share;
         text(

@@ -1,5 +1,6 @@
 //! Where the poses of a plan are, and which of them are done, in letters.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 
 /// A letter is about twice as high as wide.
@@ -94,7 +95,7 @@ fn cell(d: Direction) -> usize {
         let place = 0.5 * (1.0 + share) * (n - 1) as f64;
         (place.round() as usize).min(n - 1)
     };
-    along(-r * d.phi.sin(), ROWS) * COLUMNS + along(r * d.phi.cos(), COLUMNS)
+    along(-r * d.phi.sine(), ROWS) * COLUMNS + along(r * d.phi.cosine(), COLUMNS)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Merging against the simulated sensor's truth.
 
 use crate::hdr::*;
+use gonia_brdf::Elementary;
 use gonia_rig::Bayer;
 use gonia_sim::scene::RawSensor;
 
@@ -28,7 +29,7 @@ fn device() -> RawSensor {
 
 /// Rates in counts a second over four orders of magnitude, one level a row.
 fn level(row: usize, channel: usize) -> f32 {
-    10f32.powf(1.0 + 4.0 * row as f32 / SIDE as f32) * [1.0, 0.8, 0.6][channel]
+    10f32.power(1.0 + 4.0 * row as f32 / SIDE as f32) * [1.0, 0.8, 0.6][channel]
 }
 
 fn expose(

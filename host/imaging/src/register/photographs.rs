@@ -1,6 +1,7 @@
 //! Lines in photographs by a real camera: its noise, its compression, its lens.
 
 use super::*;
+use gonia_brdf::Elementary;
 use gonia_rig::CameraGeometry;
 
 /// The edges of five squares by five, as if the target's lines ran along them.
@@ -51,7 +52,7 @@ fn edges(png: &[u8]) -> Frame {
         for x in 1..width - 1 {
             let across = at(x + 1, y) - at(x - 1, y);
             let down = at(x, y + 1) - at(x, y - 1);
-            rgb[y * width + x] = [across.hypot(down); 3];
+            rgb[y * width + x] = [across.hypotenuse(down); 3];
         }
     }
     Frame { width, height, rgb }
@@ -98,7 +99,7 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
         let off = [[4.0, -3.0], [-5.0, 2.0], [3.0, 4.0], [-2.0, -5.0]];
         let pointed_at = [0, 1, 2, 3].map(|i| {
             let nearest = |p: &&([f64; 2], [f64; 2])| {
-                (p.0[0] - outer[i][0]).hypot(p.0[1] - outer[i][1]) < 1.0
+                (p.0[0] - outer[i][0]).hypotenuse(p.0[1] - outer[i][1]) < 1.0
             };
             let corner = registrar
                 .camera
@@ -125,7 +126,7 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
             .unwrap();
         let miss = |map: &Homography, (mm, px): &([f64; 2], [f64; 2])| {
             let at = registrar.camera.distort(map.apply(*mm));
-            (at[0] - px[0]).hypot(at[1] - px[1])
+            (at[0] - px[0]).hypotenuse(at[1] - px[1])
         };
         let before = rms(seen.iter().map(|c| miss(&predicted, c)));
         let after = rms(seen.iter().map(|c| miss(&found, c)));

@@ -6,6 +6,7 @@
 //! plane, the noise is 1 % of a white surface's radiance in every pixel, whatever the light's cosine,
 //! and 3 % of the value for what strips differ in.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::dot;
 use gonia_brdf::{Brdf, Direction, Sample, Vec3};
 use rayon::prelude::*;
@@ -25,7 +26,7 @@ const THETA_MAX_DEG: f64 = 86.0;
 
 /// Samples of a material (in 1/sr, or near it) as such a measurement would give them.
 pub fn measure_on_strips(material: &dyn Brdf, seed: u64) -> Vec<Sample> {
-    let least_cosine = THETA_MAX_DEG.to_radians().cos();
+    let least_cosine = THETA_MAX_DEG.to_radians().cosine();
     (0..LEANINGS * LIGHTS)
         .into_par_iter()
         .flat_map_iter(|image| {
@@ -33,12 +34,12 @@ pub fn measure_on_strips(material: &dyn Brdf, seed: u64) -> Vec<Sample> {
             let around = spread(image % LIGHTS, LIGHTS, 170.0).to_radians();
             // The camera looks along −z; the axis of the cylinder leans in the plane of y and z.
             let view = [0.0, 0.0, 1.0];
-            let light = [around.sin(), 0.0, around.cos()];
-            let (s, c) = leaning.sin_cos();
+            let light = [around.sine(), 0.0, around.cosine()];
+            let (s, c) = leaning.sine_cosine();
             let axis = [0.0, c, s];
             (0..NORMALS).flat_map(move |k| {
                 let across = spread(k, NORMALS, 85.0).to_radians();
-                let normal = [across.sin(), -s * across.cos(), c * across.cos()];
+                let normal = [across.sine(), -s * across.cosine(), c * across.cosine()];
                 let beside = cross(axis, normal);
                 let local = |v: Vec3| [dot(v, beside), dot(v, axis), dot(v, normal)];
                 let (l, v) = (local(light), local(view));
@@ -68,7 +69,7 @@ fn spread(k: usize, n: usize, limit: f64) -> f64 {
 }
 
 fn turned(v: Vec3, angle: f64) -> Vec3 {
-    let (s, c) = angle.sin_cos();
+    let (s, c) = angle.sine_cosine();
     [v[0] * c - v[1] * s, v[0] * s + v[1] * c, v[2]]
 }
 
@@ -129,7 +130,7 @@ mod tests {
         let at = |t: f32, p: f32| Direction::from_deg(t.into(), p.into()).to_vec3();
         let light = at(sample.theta_i_deg, sample.phi_i_deg);
         let view = at(sample.theta_v_deg, sample.phi_v_deg);
-        let between = dot(light, view).acos().to_degrees();
+        let between = dot(light, view).arc_cosine().to_degrees();
         assert!((between - around.abs()).abs() < 1e-3);
     }
 }

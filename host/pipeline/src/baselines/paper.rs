@@ -63,6 +63,7 @@ fn fine_node(coarse: Grid, fine: Grid, node: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Elementary;
     use gonia_brdf::Sample;
     use gonia_brdf::model::{Brdf, Kurt};
 
@@ -98,7 +99,7 @@ mod tests {
         let found = fill_check_cells(&bins, &BaselineSettings::PAPER, grid).unwrap();
         let truth = DenseBrdf::tabulate(grid, &model);
         let pairs = found.planes()[1].iter().zip(&truth.planes()[1]);
-        let sum: f32 = pairs.map(|(a, b)| (a / b).ln().powi(2)).sum();
+        let sum: f32 = pairs.map(|(a, b)| (a / b).natural_log().powi(2)).sum();
         let rms = (sum / grid.n_cells() as f32).sqrt();
         assert!(rms < 0.05, "{rms}");
     }

@@ -1,5 +1,6 @@
 //! Which samples take part: frames for cross-validation, and subsets of frames.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, angle_between, normalize};
 use gonia_brdf::{Direction, Pose, Sample};
 use std::collections::HashMap;
@@ -209,7 +210,7 @@ impl<'a> FrameSubset<'a> {
 }
 
 fn centres_of(samples: &[Sample], frames: &[Frame]) -> Vec<Sample> {
-    let limit = OBLIQUE_DEG.to_radians().cos();
+    let limit = OBLIQUE_DEG.to_radians().cosine();
     let means: HashMap<u32, &Frame> = frames
         .iter()
         .filter(|frame| frame.light[2] > limit)

@@ -2,6 +2,7 @@
 
 use crate::accumulate::{Cell, Sums};
 use crate::chart::frames::ChartError;
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{Bins, Brdf, Direction, Grid};
 use gonia_render as render;
@@ -311,7 +312,7 @@ impl TestSet {
                 test.strata,
                 &Cell {
                     log: [0, 1, 2]
-                        .map(|c| (got[c].max(self.floor) / truth[c].max(self.floor)).ln()),
+                        .map(|c| (got[c].max(self.floor) / truth[c].max(self.floor)).natural_log()),
                     cos_error: [0, 1, 2].map(|c| (got[c] - truth[c]).abs() * cosines),
                     cos_value: (truth[0] + truth[1] + truth[2]) * cosines,
                     reciprocity_a: 0.0,
@@ -349,11 +350,11 @@ fn factor_to(truth: &DenseFile, bins: &Bins) -> f64 {
         .flat_map(|bin| {
             let at = |d: [f32; 3]| Direction::from_vec3(d.map(f64::from));
             let truth = truth.brdf.lookup(at(bin.light), at(bin.view));
-            [0, 1, 2].map(|c| (truth[c] / bin.median[c]).ln())
+            [0, 1, 2].map(|c| (truth[c] / bin.median[c]).natural_log())
         })
         .filter(|ratio| ratio.is_finite())
         .collect();
-    f64::from(gonia_brdf::quantile::median(&mut ratios)).exp()
+    f64::from(gonia_brdf::quantile::median(&mut ratios)).exponential()
 }
 
 fn draw(brdf: &dyn Brdf) -> Picture {

@@ -6,6 +6,7 @@
 //! interpolated between the nearest poses, and vanishes far from all of them. Both parts are the
 //! same with light and view exchanged, as the reference itself is.
 
+use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, dot, normalize};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Pose};
 use nalgebra::{DMatrix, DVector};
@@ -35,7 +36,7 @@ pub fn fit_central(values: &[(Pose, [f32; 3])]) -> Option<CentralField> {
     }
     let logs: Vec<[f64; 3]> = values
         .iter()
-        .map(|(_, v)| v.map(|v| f64::from(v).ln()))
+        .map(|(_, v)| v.map(|v| f64::from(v).natural_log()))
         .collect();
     let degree = [3, 2, 1]
         .into_iter()
@@ -88,7 +89,7 @@ impl CentralField {
             Some(table) => table.lookup(Direction::from_vec3(light), Direction::from_vec3(view)),
             None => [0.0; 3],
         };
-        [0, 1, 2].map(|c| (trend[c] + f64::from(residual[c])).exp() as f32)
+        [0, 1, 2].map(|c| (trend[c] + f64::from(residual[c])).exponential() as f32)
     }
 
     fn trend(&self, row: &[f64]) -> [f64; 3] {
@@ -247,7 +248,7 @@ mod tests {
             let view = Direction::from_deg(angle(0.569_84, 75.0), angle(0.438_2, 360.0));
             let truth = fabric.eval(light.to_vec3(), view.to_vec3());
             let value = field.at(light.to_vec3(), view.to_vec3());
-            squares.push((f64::from(value[1]) / truth[1]).ln().powi(2));
+            squares.push((f64::from(value[1]) / truth[1]).natural_log().powi(2));
         }
         let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         println!("rms {rms}");
@@ -262,7 +263,7 @@ mod tests {
             .map(|p| {
                 (
                     p,
-                    [(1.0 + p.light.theta + 0.3 * p.view.phi.sin()) as f32; 3],
+                    [(1.0 + p.light.theta + 0.3 * p.view.phi.sine()) as f32; 3],
                 )
             })
             .collect();

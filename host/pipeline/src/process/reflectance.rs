@@ -151,6 +151,7 @@ fn lookup(nodes: &[[f32; 3]], light: Vec3, view: Vec3) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Elementary;
 
     fn known(table: ReflectanceTable) -> KnownReference {
         KnownReference::new(&Reference::Table {
@@ -189,8 +190,8 @@ mod tests {
     fn a_table_over_poses_is_isotropic_reciprocal_and_true_at_its_rows() {
         // A smooth reflectance factor, higher towards grazing and in the forward direction.
         let truth = |theta_i: f64, theta_v: f64, apart: f64| {
-            let [i, v] = [theta_i, theta_v].map(|t| t.to_radians().sin());
-            0.98 + 0.1 * i * v * (1.0 - apart.to_radians().cos()) / 2.0
+            let [i, v] = [theta_i, theta_v].map(|t| t.to_radians().sine());
+            0.98 + 0.1 * i * v * (1.0 - apart.to_radians().cosine()) / 2.0
         };
         let mut rows = Vec::new();
         for (i, v, p) in

@@ -24,6 +24,7 @@
 //! ```
 
 use super::{Block, KrigingBlock};
+use crate::elementary::Elementary;
 use nalgebra::RealField;
 use pulp::Simd;
 use pulp::bytemuck::cast_slice_mut;
@@ -106,8 +107,8 @@ pub struct Matern32;
 impl Matern32 {
     /// The formula itself, in any precision.
     #[inline(always)]
-    pub fn of<T: RealField + Copy>(s: T) -> T {
-        (T::one() + s) * (-s).exp()
+    pub fn of<T: RealField + Elementary>(s: T) -> T {
+        (T::one() + s) * (-s).exponential()
     }
 }
 
@@ -195,7 +196,7 @@ mod tests {
             "exponential"
         }
         fn correlation(&self, s: f32) -> f32 {
-            (-s).exp()
+            (-s).exponential()
         }
     }
 

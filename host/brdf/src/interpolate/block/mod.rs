@@ -254,6 +254,7 @@ mod tests {
     use super::super::coordinates::Coordinates;
     use super::kernel::Matern32;
     use super::*;
+    use crate::elementary::Elementary;
 
     const SETTINGS: BlockSettings = BlockSettings {
         range: 8.0,
@@ -264,7 +265,7 @@ mod tests {
     };
 
     fn datum(x: f32, y: f32, count: f32) -> Datum {
-        let v = (3.0 * x).sin() + 0.5 * y;
+        let v = (3.0 * x).sine() + 0.5 * y;
         Datum {
             point: [x, y, 0.0, 0.0, 0.0, 0.0],
             log_value: [v, 2.0 * v, -v],
@@ -318,7 +319,7 @@ mod tests {
                 .sum::<f64>()
                 .sqrt()
                 * scale;
-            (1.0 + s) * (-s).exp()
+            (1.0 + s) * (-s).exponential()
         };
         for c in 0..3 {
             // (K + λ I) w + μ = y, and the weights sum to zero.
@@ -351,7 +352,7 @@ mod tests {
         let k = |a: &Point, b: &Point| {
             let squares = (0..6).map(|i| f64::from(a[i] - b[i]).powi(2));
             let s = squares.sum::<f64>().sqrt() * scale;
-            (1.0 + s) * (-s).exp()
+            (1.0 + s) * (-s).exponential()
         };
         let places: Vec<Point> = (0..20)
             .map(|i| datum(0.05 * i as f32 - 0.5, 0.3, 1.0).point)
