@@ -92,6 +92,15 @@ pub struct SamplesRead {
     pub remarks: Vec<Remark>,
 }
 
+/// What is known of samples beside their rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SampleNote {
+    /// Whether their values are 1/sr, where that is known.
+    pub scale: Option<Scale>,
+    /// Where they came from, by name: what made them, rig, plan, versions.
+    pub provenance: BTreeMap<String, String>,
+}
+
 impl From<Vec<Sample>> for SamplesRead {
     fn from(samples: Vec<Sample>) -> Self {
         Self {
@@ -105,8 +114,10 @@ impl From<Vec<Sample>> for SamplesRead {
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
     pub read: fn(&Path) -> Result<SamplesRead, FileError>,
-    /// Writes a file whole.
-    pub write: fn(&Path, &[Sample]) -> Result<(), FileError>,
+    /// Writes a file whole, with what is known of the samples where it can hold that.
+    pub write: fn(&Path, &[Sample], Option<&SampleNote>) -> Result<(), FileError>,
+    /// Whether it can.
+    pub holds_notes: bool,
 }
 
 /// A format of another group, which `gonia import` reads.
@@ -121,14 +132,33 @@ pub struct ForeignFormat {
 pub enum ForeignContent {
     /// A BRDF that has a value for every pair of directions.
     Brdf {
-        /// Whether its values are 1/sr.
-        scale: Scale,
+        /// Whether its values are 1/sr; `None` where nobody knows.
+        scale: Option<Scale>,
         /// Reads a file, which may fail with one line that names it.
-        read: fn(&Path) -> Result<Box<dyn Brdf>, FileError>,
+        read: fn(&Path) -> Result<Box<dyn ForeignBrdf>, FileError>,
     },
     /// Samples, with directions that were not measured.
     Samples {
         /// Reads a file, which may fail with one line that names it.
         read: fn(&Path) -> Result<Vec<Sample>, FileError>,
     },
+}
+
+/// Another group's BRDF, with what its file does not hold.
+pub trait ForeignBrdf: Brdf {
+    /// Values that the file does not hold, and what became of them; `None` where it holds all.
+    fn gaps(&self) -> Option<Gaps>;
+}
+
+/// Values that a file does not hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gaps {
+    /// Values without a measurement.
+    pub missing: u64,
+    /// All values of the file.
+    pub of: u64,
+    /// What stands in their place.
+    pub instead: &'static str,
+    /// Evaluations so far that such a value went into.
+    pub evaluations: u64,
 }

@@ -6,6 +6,7 @@ use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
 use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
 use gonia_brdf::{Bins, DenseBrdf, Sample};
+use gonia_formats::checksum;
 use gonia_formats::dense::write_dense;
 use gonia_formats::fit_toml::FitNote;
 use gonia_rig::{DenseFile, Figures, Scale};
@@ -71,7 +72,8 @@ pub fn fit_model<F: ModelFamily + Display>(
     let figures = step(progress, Step::Comparing, |_| {
         against(&dense, &model_name, measured, name)
     })?;
-    let note = FitNote::new(&fit, seconds, figures);
+    let mut note = FitNote::new(&fit, seconds, figures);
+    note.dense = Some(checksum::of_brdf(&measured.brdf));
     Ok(FitResult { note, dense })
 }
 

@@ -1,6 +1,7 @@
 //! What the demo did, in figures: for `summary.toml`, and as a table on the terminal.
 
 use crate::demo::session::Session;
+use crate::say::outln;
 use crate::table;
 use gonia_brdf::Grid;
 use gonia_formats::{BinCounts, CellCounts, FileNote, PoseCounts, Summary};
@@ -169,6 +170,6 @@ pub fn print(summary: &Summary, session: &Session, frame_rows: &[(String, String
     }
     table::print(&rows);
     if let Some(figures) = &summary.figures {
-        println!("\n{figures}");
+        outln!("\n{figures}");
     }
 }
