@@ -1,9 +1,10 @@
 //! `gonia compare`: one dense BRDF against another.
 
+use crate::output;
 use crate::say::outln;
 use anyhow::Result;
 use gonia_formats::dense::read_dense;
-use gonia_formats::{check_output, write_whole_bytes};
+use gonia_formats::write_whole_bytes;
 use gonia_pipeline::{Options, Side, Table, compare};
 use std::path::PathBuf;
 
@@ -25,7 +26,7 @@ impl Compare {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         if let Some(csv) = &self.csv {
-            check_output(csv, &[&self.a, &self.b])?;
+            output::check_table(csv, &[&self.a, &self.b])?;
         }
         let a = read_dense(&self.a)?;
         let b = read_dense(&self.b)?;

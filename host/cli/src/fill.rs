@@ -101,13 +101,13 @@ impl Fill {
             check_dense_name(output)?;
             check_output(output, &inputs)?;
         }
-        if let Some(error) = &self.error {
-            if *error == self.output {
-                bail!(
-                    "--error {}: is the output too; give another name",
-                    error.display()
-                );
-            }
+        if let Some(error) = &self.error
+            && *error == self.output
+        {
+            bail!(
+                "--error {}: is the output too; give another name",
+                error.display()
+            );
         }
         let progress = Progress::new();
         let names = self.names();

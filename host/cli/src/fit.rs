@@ -10,7 +10,9 @@ use gonia_formats::dense::{check_dense_name, read_dense};
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::samples::{check_scale, read_samples};
 use gonia_formats::{check_output, check_writable_beside};
-use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model, five_digits, write_fit};
+use gonia_pipeline::fit::{
+    cells_of_dense, cells_of_samples, fit_model, five_digits, level_remark, write_fit,
+};
 use gonia_rig::Scale;
 use std::path::{Path, PathBuf};
 
@@ -98,8 +100,10 @@ impl Fit {
                 let read = progress.stage("reading samples", |_| read_samples(path))?;
                 remarks::print(&read.remarks);
                 check_scale(path, read.scale, measured.scale)?;
-                cells_of_samples(&measured.brdf, &read.samples, &settings)
-                    .with_context(|| path.display().to_string())?
+                let cells = cells_of_samples(&measured.brdf, &read.samples, &settings)
+                    .with_context(|| path.display().to_string())?;
+                remarks::print(level_remark(&measured.brdf, &cells, path).as_slice());
+                cells
             }
         };
         let result = fit_model(

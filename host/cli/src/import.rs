@@ -42,16 +42,18 @@ impl Import {
             Grid::with_step_deg(self.step).with_context(|| format!("--step {}", self.step))?;
         let ForeignFormat { name, content } = foreign_format(&self.material)?;
         match content {
-            ForeignContent::Brdf { .. } => check_dense_name(&self.output)?,
-            ForeignContent::Samples { .. } => check_sample_name(&self.output)?,
-        }
-        check_output(&self.output, &[&self.material])?;
-        match content {
             ForeignContent::Brdf { scale, read } => {
                 let scale = self.scale_of(name, *scale)?;
-                self.import_brdf(grid, name, scale, read(&self.material)?.as_ref())
+                let model = read(&self.material)?;
+                check_dense_name(&self.output)?;
+                check_output(&self.output, &[&self.material])?;
+                self.import_brdf(grid, name, scale, model.as_ref())
             }
-            ForeignContent::Samples { read } => self.import_samples(name, *read),
+            ForeignContent::Samples { read } => {
+                check_sample_name(&self.output)?;
+                check_output(&self.output, &[&self.material])?;
+                self.import_samples(name, *read)
+            }
         }
     }
 
@@ -91,6 +93,7 @@ impl Import {
             provenance.insert("not_measured".into(), text.clone());
             rows.push(("not measured".into(), text));
         }
+        rows.extend(beyond(grid, model.last_deg()));
         rows.push(("written".into(), self.output.display().to_string()));
         write_dense(
             &self.output,
@@ -132,6 +135,20 @@ impl Import {
         );
         provenance
     }
+}
+
+/// How much of the grid lies beyond the last polar angle of a file, as a row.
+fn beyond(grid: Grid, last_deg: f64) -> Option<(String, String)> {
+    let is_within = |index: &usize| grid.direction(*index).theta_deg() <= last_deg + 1e-6;
+    let n = grid.n_directions();
+    let within = (0..n).filter(is_within).count();
+    let cells = n * n - within * within;
+    (cells > 0).then(|| {
+        (
+            format!("beyond {last_deg} degrees"),
+            format!("{} cells of the grid: the value there", count(cells as u64)),
+        )
+    })
 }
 
 /// What a file does not hold, and how much of the grid that is.

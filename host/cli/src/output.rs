@@ -22,6 +22,26 @@ pub fn check_picture(path: &Path, endings: &[&str], inputs: &[&Path]) -> Result<
     Ok(())
 }
 
+/// Endings that nobody gives a table in text by purpose.
+const NO_TABLES: [&str; 10] = [
+    "exr", "npy", "npz", "png", "toml", "html", "svg", "json", "xlsx", "ods",
+];
+
+/// Checks the name of a table (CSV), which may have any ending but that of another kind of file.
+///
+/// # Errors
+/// One line that names it, and what to do.
+pub fn check_table(path: &Path, inputs: &[&Path]) -> Result<()> {
+    if NO_TABLES.iter().any(|ending| ends_in(path, ending)) {
+        bail!(
+            "{}: has the ending of another kind of file than a table; end the name in .csv",
+            path.display()
+        );
+    }
+    check_output(path, inputs)?;
+    Ok(())
+}
+
 /// Whether a name has an ending, in either case.
 pub fn ends_in(path: &Path, ending: &str) -> bool {
     path.extension()

@@ -1,10 +1,9 @@
 //! `gonia plan`: what a session will do, without doing it.
 
 use crate::plan_adaptive::{expectation, propose};
-use crate::{remarks, table};
+use crate::{output, remarks, table};
 use anyhow::{Result, bail};
 use gonia_acquire::capture::{SETTLE_TIME_S, keep_apart, travelling, travelling_order};
-use gonia_formats::check_output;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_imaging::SamplingGrid;
@@ -72,7 +71,7 @@ impl Plan {
         if let Some(path) = &self.output {
             let samples = self.adaptive.iter().map(PathBuf::as_path);
             let inputs: Vec<&Path> = samples.chain([&*self.rig]).collect();
-            check_output(path, &inputs)?;
+            output::check_table(path, &inputs)?;
         }
         let (mut plan, proposed) = if self.adaptive.is_empty() {
             let mut rings = Rings::paper();

@@ -39,7 +39,7 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
     }
     let set = SampleSet {
         samples: read.samples,
-        scale: Scale::Relative,
+        scale: read.scale.unwrap_or(Scale::Relative),
     };
     let options = FillOptions {
         with_errors: true,

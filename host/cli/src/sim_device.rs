@@ -155,7 +155,6 @@ mod ptys {
                 _slave: slave,
             });
         }
-        std::io::stdout().flush()?;
         let began = Instant::now();
         loop {
             for port in &mut ports {

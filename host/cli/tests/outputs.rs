@@ -48,7 +48,7 @@ impl Bench {
             })
             .collect();
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        let rows = ["scale ", "factor ", "not measured "];
+        let rows = ["scale ", "factor ", "not measured ", "beyond "];
         let output = gonia(&arguments, input);
         let case = Case::new(came_in, &output, self.dir.path(), &rows);
         assert_eq!(case.code(), code, "{came_in}: {}", case.said());
@@ -167,6 +167,31 @@ fn scales(bench: &mut Bench) {
     ];
     bench.case(came_in, &fill(&["@stale.npy"], &[]), "", 0, &said);
     assert_eq!(scale(bench), Scale::Relative);
+    let came_in = "a fit to samples that are not those of the dense BRDF";
+    let brighter: Vec<Sample> = samples
+        .iter()
+        .map(|s| Sample {
+            rgb: s.rgb.map(|v| 2.0 * v),
+            ..*s
+        })
+        .collect();
+    write_samples(&bench.at("brighter.npy"), &brighter).unwrap();
+    let fit = |samples: &'static str| {
+        let fixed = ["fit", "@filled.exr", "--model", "lambert", "--starts", "4"];
+        [&fixed[..], &["--cells", "300", "--samples", samples]].concat()
+    };
+    bench.case(
+        "a fit to the samples of the dense BRDF",
+        &fit("@silent.npy"),
+        "",
+        0,
+        &[],
+    );
+    let said = [
+        "warning: brighter.npy: its values are ",
+        "times those of the dense BRDF",
+    ];
+    bench.case(came_in, &fit("@brighter.npy"), "", 0, &said);
     let came_in = "a fit of a relative BRDF to absolute samples";
     let fit = [
         "fit",
@@ -293,7 +318,7 @@ fn error_bars_belong_to_the_brdf_that_was_written_with_them() {
         text(&errors),
     ];
     gonia_ok(
-        &[&fill[..], &["--step", "15", "--preset", "preview"]].concat(),
+        &[&fill[..], &["--step", "30", "--preset", "preview"]].concat(),
         "",
     );
     let report = |expected: bool| {
@@ -509,6 +534,13 @@ fn outputs(bench: &mut Bench) {
         1,
         &["there: is a folder"],
     );
+    let came_in = "`compare --csv figures.exr`";
+    let compare = ["compare", "@a.exr", "@b.exr", "--csv", "@figures.exr"];
+    bench.case(came_in, &compare, "", 1, &["end the name in .csv"]);
+    let came_in = "`compare --csv /dev/null`";
+    let compare = ["compare", "@a.exr", "@b.exr", "--csv", "/dev/null"];
+    #[cfg(unix)]
+    bench.case(came_in, &compare, "", 1, &["is no ordinary file"]);
     let process = ["process", "@nowhere", "-o", "@samples.txt"];
     bench.case(
         "`process -o samples.txt`",

@@ -110,12 +110,15 @@ impl From<Vec<Sample>> for SamplesRead {
     }
 }
 
+/// Writes samples whole, and what is known of them.
+pub(crate) type WriteSamples = fn(&Path, &[Sample], Option<&SampleNote>) -> Result<(), FileError>;
+
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
     pub read: fn(&Path) -> Result<SamplesRead, FileError>,
     /// Writes a file whole, with what is known of the samples where it can hold that.
-    pub write: fn(&Path, &[Sample], Option<&SampleNote>) -> Result<(), FileError>,
+    pub write: WriteSamples,
     /// Whether it can.
     pub holds_notes: bool,
 }
@@ -148,6 +151,11 @@ pub enum ForeignContent {
 pub trait ForeignBrdf: Brdf {
     /// Values that the file does not hold, and what became of them; `None` where it holds all.
     fn gaps(&self) -> Option<Gaps>;
+
+    /// The last polar angle that the file holds, degrees: beyond it values are those there.
+    fn last_deg(&self) -> f64 {
+        90.0
+    }
 }
 
 /// Values that a file does not hold.

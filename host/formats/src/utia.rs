@@ -108,6 +108,10 @@ impl Brdf for Utia {
 }
 
 impl ForeignBrdf for Utia {
+    fn last_deg(&self) -> f64 {
+        (N_THETA - 1) as f64 * THETA_STEP_DEG
+    }
+
     fn gaps(&self) -> Option<Gaps> {
         (self.negative > 0).then(|| Gaps {
             missing: self.negative,

@@ -49,6 +49,13 @@ pub fn write_whole_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// # Errors
 /// When the folder cannot be made, is a file, or a file cannot be made and written in it.
 pub fn check_writable(folder: &Path) -> Result<(), FileError> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(FileError::new(
+            folder,
+            "is no folder",
+            "give the name of a folder",
+        ));
+    }
     let failed = |error: io::Error| FileError::writing(folder, &error);
     fs::create_dir_all(folder).map_err(failed)?;
     let mut probe = temporary(folder).map_err(failed)?;
@@ -90,6 +97,10 @@ pub fn check_output(file: &Path, inputs: &[&Path]) -> Result<(), FileError> {
 /// Whether a file may stand under this name: an ordinary one, or none yet.
 fn check_name(file: &Path) -> Result<(), FileError> {
     let is_folder = || FileError::new(file, "is a folder", "give the name of a file in it");
+    let no_ordinary_file = || {
+        let problem = "is no ordinary file (a device or a pipe)";
+        FileError::new(file, problem, "give the name of a file")
+    };
     let ends_in_separator = file
         .as_os_str()
         .to_string_lossy()
@@ -97,15 +108,16 @@ fn check_name(file: &Path) -> Result<(), FileError> {
     if ends_in_separator || file.file_name().is_none() {
         return Err(is_folder());
     }
+    // /dev/stdout may lead to an ordinary file, but a rename would replace the link to it.
+    let is_of_the_system = cfg!(unix)
+        && (file.parent() == Some(Path::new("/dev"))
+            || ["/dev/fd", "/proc"].iter().any(|of| file.starts_with(of)));
     match fs::metadata(file) {
+        Ok(_) if is_of_the_system => Err(no_ordinary_file()),
         Ok(there) if there.is_dir() => Err(is_folder()),
         Ok(there) if there.is_file() => Ok(()),
         // A rename would put a file in the place of the device.
-        Ok(_) => Err(FileError::new(
-            file,
-            "is no ordinary file (a device or a pipe)",
-            "give the name of a file",
-        )),
+        Ok(_) => Err(no_ordinary_file()),
         // Not there, or its folder is not: both can be made.
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(error) => Err(FileError::writing(file, &error)),
@@ -198,6 +210,11 @@ mod tests {
         assert!(check_output(&dir.path().join("out.exr"), &[&input]).is_ok());
         let below = say(&input.join("a.exr"));
         assert!(below.contains("choose a place inside a folder"), "{below}");
+        let error = check_writable(&input).unwrap_err().to_string();
+        assert!(
+            error.ends_with("is no folder; give the name of a folder"),
+            "{error}"
+        );
     }
 
     #[cfg(unix)]
@@ -207,8 +224,10 @@ mod tests {
         let long = dir.path().join("a".repeat(300));
         let error = check_writable_beside(&long).unwrap_err().to_string();
         assert!(error.ends_with("choose a shorter name"), "{error}");
-        let error = write_whole_bytes(Path::new("/dev/null"), b"x").unwrap_err();
-        assert!(error.to_string().contains("is no ordinary file"), "{error}");
+        for device in ["/dev/null", "/dev/stdout", "/proc/self/fd/1"] {
+            let error = write_whole_bytes(Path::new(device), b"x").unwrap_err();
+            assert!(error.to_string().contains("is no ordinary file"), "{error}");
+        }
     }
 
     #[cfg(unix)]

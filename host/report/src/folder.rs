@@ -17,6 +17,7 @@ use gonia_rig::{DenseFile, Remark};
 use std::path::{Path, PathBuf};
 
 /// What became of a folder's report.
+#[derive(Clone, Debug)]
 pub struct Drawn {
     /// The paths of what was written, the report first.
     pub written: Vec<PathBuf>,
