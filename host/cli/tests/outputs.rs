@@ -318,7 +318,7 @@ fn error_bars_belong_to_the_brdf_that_was_written_with_them() {
         text(&errors),
     ];
     gonia_ok(
-        &[&fill[..], &["--step", "30", "--preset", "preview"]].concat(),
+        &[&fill[..], &["--step", "15", "--preset", "preview"]].concat(),
         "",
     );
     let report = |expected: bool| {
