@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Interpolates samples to every cell of the grid.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame."
+    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame. Their scale is what a .csv says above its header\n(# scale = absolute), or the note beside a .npy (NAME.npy.toml, as gonia process writes it)."
 )]
 pub struct Fill {
     /// Samples, .npy or .csv; several files of one material count together
