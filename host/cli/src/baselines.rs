@@ -2,8 +2,10 @@
 //! share.
 
 use crate::progress::Progress;
+use crate::say::outln;
 use anyhow::{Context, Result};
 use gonia_formats::baselines_toml::BaselineTable;
+use gonia_formats::check_writable;
 use gonia_pipeline::baselines::BaselineOptions;
 use gonia_report::make_baselines;
 use gonia_rig::{Figures, Stratum};
@@ -15,6 +17,10 @@ pub fn make_and_print(
     step_deg: Option<f64>,
     options: &BaselineOptions,
 ) -> Result<()> {
+    // A folder that is not there is no place to write to, and is not made.
+    if folder.is_dir() {
+        check_writable(folder)?;
+    }
     let progress = Progress::new();
     let comparison = make_baselines(folder, step_deg, options, &progress.watch())
         .with_context(|| folder.display().to_string())?;
@@ -24,9 +30,13 @@ pub fn make_and_print(
 
 /// The table on standard output.
 fn print(comparison: &BaselineTable) {
-    println!(
+    outln!(
         "{:<14} {:>11} {:>10}  {:<32}  {:<32}",
-        "way", "numbers", "seconds", "against dense: int, graz, cos, ΔE", "against truth"
+        "way",
+        "numbers",
+        "seconds",
+        "against dense: int, graz, cos, ΔE",
+        "against truth"
     );
     for row in &comparison.rows {
         let text = |figures: &Option<Figures>| match figures {
@@ -46,7 +56,7 @@ fn print(comparison: &BaselineTable) {
                 )
             }
         };
-        println!(
+        outln!(
             "{:<14} {:>11} {:>10.1}  {:<32}  {:<32}",
             row.name,
             row.numbers,

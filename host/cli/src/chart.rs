@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use crate::remarks;
+use crate::say::outln;
 use crate::{chart_motion, table};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Bins, Grid, Sample};
@@ -66,18 +67,19 @@ impl Chart {
         let Some(path) = &self.samples else {
             return chart_motion::draw(&self.out, self.seed);
         };
-        let grid = Grid::with_step_deg(self.step).context("--step")?;
+        let grid =
+            Grid::with_step_deg(self.step).with_context(|| format!("--step {}", self.step))?;
         if !(100..=1_000_000).contains(&self.tests) {
             bail!("--tests {}: must lie in 100..=1000000", self.tests);
         }
+        check_writable(&self.out)?;
         let progress = Progress::new();
         let read = progress.stage("reading samples", |_| read_samples(path))?;
         remarks::print(&read.remarks);
-        check_writable(&self.out)?;
         let (samples, tests) = self
             .test_set(read.samples, grid, &progress)
             .with_context(|| path.display().to_string())?;
-        println!("compared with {}", tests.basis());
+        outln!("compared with {}", tests.basis());
         if self.only != Some(Only::Images) {
             let bins = Bins::new(grid, &samples);
             let frames = FrameSubset::all_of(&samples)[0].frames();
@@ -143,7 +145,7 @@ impl Chart {
         let file = |extension| self.out.join(name).with_extension(extension);
         write_whole_bytes(&file("svg"), svg.as_bytes())?;
         write_whole_bytes(&file("csv"), to_csv(points).as_bytes())?;
-        println!("written    {} and .csv", file("svg").display());
+        outln!("written    {} and .csv", file("svg").display());
         Ok(())
     }
 }
@@ -162,9 +164,17 @@ fn print_points(points: &[ChartPoint]) {
     let front = front(points, |p| of(p, Stratum::All).map(|row| row.log_rms));
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|a, b| points[*a].core_s.total_cmp(&points[*b].core_s));
-    println!(
+    outln!(
         "{:<52} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>9}",
-        "method", "core-s", "all", "interior", "grazing", "highl.", "cos", "sphere", "share"
+        "method",
+        "core-s",
+        "all",
+        "interior",
+        "grazing",
+        "highl.",
+        "cos",
+        "sphere",
+        "share"
     );
     for k in order {
         let point = &points[k];
@@ -173,7 +183,7 @@ fn print_points(points: &[ChartPoint]) {
             None => "–".into(),
         };
         let cos = of(point, Stratum::All).map_or(f64::NAN, |row| row.cos_error_mean);
-        println!(
+        outln!(
             "{} {:<50} {:>9.1} {:>8} {:>8} {:>8} {:>8} {:>7.2}% {:>7} {:>9.1e}",
             if front.contains(&k) { "*" } else { " " },
             point.name,
@@ -190,7 +200,7 @@ fn print_points(points: &[ChartPoint]) {
         );
         if point.failed > 0.0 {
             let failed = (point.failed * 1e4).round() as u64;
-            println!("  failed in {} of 10,000 cells", table::count(failed));
+            outln!("  failed in {} of 10,000 cells", table::count(failed));
         }
     }
 }

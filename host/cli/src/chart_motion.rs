@@ -1,5 +1,6 @@
 //! `gonia chart --motion`: the arms' speed against their accuracy.
 
+use crate::say::{self, outln};
 use anyhow::Result;
 use gonia_acquire::capture::{POINTING_LIMIT_DEG, travelling};
 use gonia_acquire::motion::{JerkRow, MotionRow, jerk_rows, motion_chart, motion_rows};
@@ -25,8 +26,8 @@ pub fn draw(out: &Path, seed: u64) -> Result<()> {
     let table = csv_of(&rows, poses);
     write_whole_bytes(&out.join("motion.csv"), table.as_bytes())?;
     write_whole_bytes(&out.join("jerk.csv"), csv_of_jerk(&jerk).as_bytes())?;
-    print!("{table}");
-    println!(
+    say::out(format_args!("{table}"));
+    outln!(
         "written: motion.svg, motion.csv and jerk.csv in {}",
         out.display()
     );

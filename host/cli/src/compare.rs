@@ -1,5 +1,7 @@
 //! `gonia compare`: one dense BRDF against another.
 
+use crate::output;
+use crate::say::outln;
 use anyhow::Result;
 use gonia_formats::dense::read_dense;
 use gonia_formats::write_whole_bytes;
@@ -23,6 +25,9 @@ pub struct Compare {
 impl Compare {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        if let Some(csv) = &self.csv {
+            output::check_table(csv, &[&self.a, &self.b])?;
+        }
         let a = read_dense(&self.a)?;
         let b = read_dense(&self.b)?;
         let (name_a, name_b) = (self.a.display().to_string(), self.b.display().to_string());
@@ -32,7 +37,14 @@ impl Compare {
             ..Options::default()
         };
         let figures = compare(Table::from(&a), Side::Table(Table::from(&b)), &options)?;
-        print!("{figures}");
+        outln!("{figures}");
+        if let Some(factor) = figures.factor {
+            outln!(
+                "factor     {factor:.6} taken out: {name_a} is {}, {name_b} {}, so their levels are not compared",
+                a.scale,
+                b.scale
+            );
+        }
         if let Some(path) = &self.csv {
             write_whole_bytes(path, figures.to_csv().as_bytes())?;
         }

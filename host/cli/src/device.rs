@@ -1,5 +1,6 @@
 //! `gonia device`: the controller of one arm, for a person at the rig.
 
+use crate::say::{self, outln};
 use crate::table;
 use anyhow::{Context, Result, bail};
 use clap::{Subcommand, ValueEnum};
@@ -248,7 +249,7 @@ fn monitor(arm: &mut RemoteController, seconds: f64) -> Result<()> {
         bail!("--seconds {seconds}: must lie in 0..=1000000");
     }
     let until_us = arm.now_us() + (seconds * 1e6) as u64;
-    while arm.now_us() < until_us {
+    while arm.now_us() < until_us && !say::is_closed() {
         print_place(arm)?;
         arm.rest(PRINT_US)?;
     }
@@ -258,7 +259,7 @@ fn monitor(arm: &mut RemoteController, seconds: f64) -> Result<()> {
 fn print_place(arm: &mut RemoteController) -> Result<()> {
     let status = arm.status()?;
     let [theta, phi] = status.axes.map(|axis| f64::from(axis.encoder_udeg) * 1e-6);
-    println!(
+    outln!(
         "{:>9.1} s  theta {theta:>9.4} deg  phi {phi:>9.4} deg  {}",
         status.time_us as f64 * 1e-6,
         state_in_words(status.state)
@@ -300,7 +301,7 @@ fn log(arm: &mut RemoteController) -> Result<()> {
     for entry in arm.log()? {
         let axis = entry.axis.map(|axis| format!(" ({axis:?})"));
         if let Some(code) = entry.fault {
-            println!(
+            outln!(
                 "{:>9.1} s  {code}{}",
                 entry.time_us as f64 * 1e-6,
                 axis.unwrap_or_default()
@@ -354,10 +355,10 @@ fn calibrate(arm: &mut RemoteController, axis: Axis, stands: &[i32], absolute: b
         n += 1;
         // Readings from a file need no prompt, and an error is then a line of its own.
         if is_person {
-            eprint!(
+            say::err(format_args!(
                 "stand {n} of {}: encoder {encoder_deg:.5} deg; reference (deg): ",
                 stands.len()
-            );
+            ));
             let _ = std::io::stderr().flush();
         }
         let line = lines.next().ok_or("the input has ended")?;

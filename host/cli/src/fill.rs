@@ -2,12 +2,13 @@
 
 use crate::progress::Progress;
 use crate::remarks;
+use crate::scale::{self, ScaleArgument};
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{ErrorBars, Origin, Preset};
-use gonia_formats::check_writable_beside;
-use gonia_formats::dense::{write_dense, write_error_bars};
+use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense, write_error_bars};
 use gonia_formats::samples::read_samples_of_all;
+use gonia_formats::{check_output, checksum};
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{FillCounts, FillMethod, FillOptions, Filled, fill, fill_to_file};
 use gonia_rig::{SampleSet, Scale};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Interpolates samples to every cell of the grid.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame."
+    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame. Their scale is what a .csv says above its header\n(# scale = absolute), or the note beside a .npy (NAME.npy.toml, as gonia process writes it)."
 )]
 pub struct Fill {
     /// Samples, .npy or .csv; several files of one material count together
@@ -48,9 +49,10 @@ pub struct Fill {
     /// rbf-KERNEL (core-hours on the 2-degree grid)
     #[arg(long, value_name = "NAME", default_value = "default")]
     method: FillMethod,
-    /// What the samples' values are: relative, or absolute (1/sr)
-    #[arg(long, value_enum, default_value = "relative")]
-    scale: ScaleArgument,
+    /// What the samples' values are, where their files do not say it: relative, or absolute (1/sr)
+    /// [default: what the files say, else relative]
+    #[arg(long, value_enum)]
+    scale: Option<ScaleArgument>,
 }
 
 /// A preset on the command line.
@@ -66,12 +68,6 @@ enum PresetArgument {
     Best,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy)]
-enum ScaleArgument {
-    Relative,
-    Absolute,
-}
-
 impl From<PresetArgument> for Preset {
     fn from(argument: PresetArgument) -> Self {
         match argument {
@@ -79,15 +75,6 @@ impl From<PresetArgument> for Preset {
             PresetArgument::Fast => Preset::Fast,
             PresetArgument::Default => Preset::Default,
             PresetArgument::Best => Preset::Best,
-        }
-    }
-}
-
-impl From<ScaleArgument> for Scale {
-    fn from(argument: ScaleArgument) -> Self {
-        match argument {
-            ScaleArgument::Relative => Scale::Relative,
-            ScaleArgument::Absolute => Scale::Absolute,
         }
     }
 }
@@ -106,23 +93,33 @@ impl Fill {
             ..FillOptions::default()
         };
         let (grid, _) = options.check()?;
-        check_writable_beside(&self.output)?;
-        if let Some(error) = &self.error {
-            check_writable_beside(error)?;
-            if *error == self.output {
-                bail!(
-                    "--error {}: is the output too; give another name",
-                    error.display()
-                );
-            }
+        let inputs: Vec<&Path> = self.samples.iter().map(PathBuf::as_path).collect();
+        for output in [Some(&self.output), self.error.as_ref()]
+            .into_iter()
+            .flatten()
+        {
+            check_dense_name(output)?;
+            check_output(output, &inputs)?;
+        }
+        if let Some(error) = &self.error
+            && *error == self.output
+        {
+            bail!(
+                "--error {}: is the output too; give another name",
+                error.display()
+            );
         }
         let progress = Progress::new();
         let names = self.names();
-        let read = progress.stage("reading samples", |_| read_samples_of_all(&self.samples))?;
+        let said = self.scale.map(Scale::from);
+        let read = progress.stage("reading samples", |_| {
+            read_samples_of_all(&self.samples, said)
+        })?;
         remarks::print(&read.remarks);
+        let scale_row = scale::row(read.scale, said.is_some());
         let samples = SampleSet {
             samples: read.samples,
-            scale: self.scale.into(),
+            scale: read.scale.unwrap_or(Scale::Relative),
         };
         let facts = Provenance::from([("samples".to_owned(), names.clone())]);
         let mut rows = if options.fits_memory()? {
@@ -136,6 +133,7 @@ impl Fill {
             describe(&counts, &settings)
         };
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));
+        rows.push(scale_row);
         rows.push(("written".into(), self.output.display().to_string()));
         for stage in progress.stages() {
             rows.push((stage.name, format!("{:.1} s", stage.seconds)));
@@ -165,7 +163,12 @@ impl Fill {
             ]);
         }
         let mut file = filled.dense;
-        let (grid, scale, error_facts) = (file.brdf.grid(), file.scale, file.provenance.clone());
+        let (grid, scale) = (file.brdf.grid(), file.scale);
+        let mut error_facts = file.provenance.clone();
+        if self.error.is_some() {
+            let of = checksum::of_brdf(&file.brdf);
+            error_facts.insert(ERRORS_OF.to_owned(), of);
+        }
         file.provenance.extend(facts);
         progress.stage("writing the dense BRDF", |_| {
             write_dense(&self.output, file).map(drop)

@@ -2,16 +2,19 @@
 
 use crate::progress::Progress;
 use crate::remarks;
+use crate::say::outln;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
-use gonia_formats::check_writable_beside;
-use gonia_formats::dense::read_dense;
+use gonia_formats::dense::{check_dense_name, read_dense};
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
-use gonia_formats::samples::read_samples;
-use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model, five_digits, write_fit};
+use gonia_formats::samples::{check_scale, read_samples};
+use gonia_formats::{check_output, check_writable_beside};
+use gonia_pipeline::fit::{
+    cells_of_dense, cells_of_samples, fit_model, five_digits, level_remark, write_fit,
+};
 use gonia_rig::Scale;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Fits a model to a dense BRDF by Levenberg and Marquardt's method from many random starts, all
 /// channels at once, and prints its numbers with their standard uncertainties (from how much the
@@ -82,7 +85,11 @@ impl Fit {
             }
         }
         if let Some(output) = &self.output {
-            check_writable_beside(output)?;
+            check_dense_name(output)?;
+            let samples = self.samples.as_deref();
+            let inputs: Vec<&Path> = samples.into_iter().chain([&*self.dense]).collect();
+            check_output(output, &inputs)?;
+            check_writable_beside(&FitNote::path_beside(output))?;
         }
         let progress = Progress::new();
         let measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
@@ -92,8 +99,11 @@ impl Fit {
             Some(path) => {
                 let read = progress.stage("reading samples", |_| read_samples(path))?;
                 remarks::print(&read.remarks);
-                cells_of_samples(&measured.brdf, &read.samples, &settings)
-                    .with_context(|| path.display().to_string())?
+                check_scale(path, read.scale, measured.scale)?;
+                let cells = cells_of_samples(&measured.brdf, &read.samples, &settings)
+                    .with_context(|| path.display().to_string())?;
+                remarks::print(level_remark(&measured.brdf, &cells, path).as_slice());
+                cells
             }
         };
         let result = fit_model(
@@ -149,7 +159,7 @@ fn print_note(note: &FitNote) {
             .map(|p| (p.name.clone(), value_text(p))),
     );
     table::print(&rows);
-    println!("\n{}", note.figures);
+    outln!("\n{}", note.figures);
 }
 
 /// A fitted number as people read it.

@@ -1,14 +1,16 @@
 //! `gonia import`: other people's measurements.
 
 use crate::progress::Progress;
-use crate::table::count;
-use anyhow::{Context, Result};
-use gonia_brdf::{Brdf, DenseBrdf, Grid, Sample};
-use gonia_formats::FileError;
+use crate::say::outln;
+use crate::scale::ScaleArgument;
+use crate::table::{self, count};
+use anyhow::{Context, Result, bail};
+use gonia_brdf::{DenseBrdf, Grid, Sample};
 use gonia_formats::dense::{check_dense_name, write_dense};
-use gonia_formats::foreign::{ForeignContent, ForeignFormat, foreign_format};
-use gonia_formats::samples::{check_sample_name, write_samples};
-use gonia_pipeline::provenance::of_this_program;
+use gonia_formats::foreign::{ForeignBrdf, ForeignContent, ForeignFormat, Gaps, foreign_format};
+use gonia_formats::samples::{SampleNote, check_sample_name, write_noted_samples};
+use gonia_formats::{FileError, check_output};
+use gonia_pipeline::provenance::{Provenance, of_this_program};
 use gonia_rig::{DenseFile, Scale};
 use std::path::{Path, PathBuf};
 
@@ -17,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// Matusik (.dat, anisotropic), which is full of holes, becomes samples for `gonia fill`.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n  gonia import velvet.dat -o velvet.npy && gonia fill velvet.npy -o velvet.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
+    after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n  gonia import velvet.dat -o velvet.npy && gonia fill velvet.npy -o velvet.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Its files do not say whether they\nare 1/sr, and their readers disagree: they count as relative unless --scale absolute is given. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
 )]
 pub struct Import {
     /// The material, .bin, .binary or .dat
@@ -28,32 +30,71 @@ pub struct Import {
     /// Step of the grid in degrees
     #[arg(long, default_value_t = 2.0, value_name = "DEG")]
     step: f64,
+    /// What the values are, where the format does not say it (UTIA): relative, or absolute (1/sr)
+    #[arg(long, value_enum)]
+    scale: Option<ScaleArgument>,
 }
 
 impl Import {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let grid = Grid::with_step_deg(self.step).context("--step")?;
+        let grid =
+            Grid::with_step_deg(self.step).with_context(|| format!("--step {}", self.step))?;
         let ForeignFormat { name, content } = foreign_format(&self.material)?;
         match content {
             ForeignContent::Brdf { scale, read } => {
-                self.import_brdf(grid, name, *scale, read(&self.material)?.as_ref())
+                let scale = self.scale_of(name, *scale)?;
+                let model = read(&self.material)?;
+                check_dense_name(&self.output)?;
+                check_output(&self.output, &[&self.material])?;
+                self.import_brdf(grid, name, scale, model.as_ref())
             }
-            ForeignContent::Samples { read } => self.import_samples(*read),
+            ForeignContent::Samples { read } => {
+                check_sample_name(&self.output)?;
+                check_output(&self.output, &[&self.material])?;
+                self.import_samples(name, *read)
+            }
         }
     }
 
-    fn import_brdf(&self, grid: Grid, format: &str, scale: Scale, model: &dyn Brdf) -> Result<()> {
-        check_dense_name(&self.output)?;
+    /// What the values are, and the row that says so: what the format knows, or else `--scale`.
+    fn scale_of(&self, format: &str, known: Option<Scale>) -> Result<(Scale, String)> {
+        let said = self.scale.map(Scale::from);
+        Ok(match (known, said) {
+            (Some(known), Some(said)) if known != said => {
+                bail!("--scale {said}: the values of a {format} are {known}; leave --scale out")
+            }
+            (Some(known), _) => (known, format!("{known}, as the format is")),
+            (None, Some(said)) => (said, format!("{said}, by --scale")),
+            (None, None) => (
+                Scale::Relative,
+                format!(
+                    "relative: a {format} does not say it, and its readers disagree (--scale absolute, if it is 1/sr)"
+                ),
+            ),
+        })
+    }
+
+    fn import_brdf(
+        &self,
+        grid: Grid,
+        format: &str,
+        (scale, scale_text): (Scale, String),
+        model: &dyn ForeignBrdf,
+    ) -> Result<()> {
         let progress = Progress::new();
         let brdf = progress.stage("bringing it onto the grid", |_| {
             anyhow::Ok(DenseBrdf::tabulate(grid, model))
         })?;
-        let mut provenance = of_this_program();
-        provenance.insert(
-            "imported".into(),
-            format!("{} ({format})", self.material.display()),
-        );
+        let mut rows = vec![("scale".to_owned(), scale_text)];
+        let mut provenance = self.provenance(format);
+        if let Some(gaps) = model.gaps() {
+            let text = gaps_text(&gaps, grid);
+            provenance.insert("not_measured".into(), text.clone());
+            rows.push(("not measured".into(), text));
+        }
+        rows.extend(beyond(grid, model.last_deg()));
+        rows.push(("written".into(), self.output.display().to_string()));
         write_dense(
             &self.output,
             DenseFile {
@@ -62,19 +103,62 @@ impl Import {
                 provenance,
             },
         )?;
+        table::print(&rows);
         Ok(())
     }
 
-    fn import_samples(&self, read: fn(&Path) -> Result<Vec<Sample>, FileError>) -> Result<()> {
-        check_sample_name(&self.output)?;
+    fn import_samples(
+        &self,
+        format: &str,
+        read: fn(&Path) -> Result<Vec<Sample>, FileError>,
+    ) -> Result<()> {
         let progress = Progress::new();
         let samples = progress.stage("reading the bins", |_| read(&self.material))?;
-        write_samples(&self.output, &samples)?;
-        println!(
+        let note = SampleNote {
+            scale: self.scale.map(Scale::from),
+            provenance: self.provenance(format),
+        };
+        write_noted_samples(&self.output, &samples, &note)?;
+        outln!(
             "{} bins hold a measurement; gonia fill {} makes them dense",
             count(samples.len() as u64),
             self.output.display()
         );
         Ok(())
     }
+
+    fn provenance(&self, format: &str) -> Provenance {
+        let mut provenance = of_this_program();
+        provenance.insert(
+            "imported".into(),
+            format!("{} ({format})", self.material.display()),
+        );
+        provenance
+    }
+}
+
+/// How much of the grid lies beyond the last polar angle of a file, as a row.
+fn beyond(grid: Grid, last_deg: f64) -> Option<(String, String)> {
+    let is_within = |index: &usize| grid.direction(*index).theta_deg() <= last_deg + 1e-6;
+    let n = grid.n_directions();
+    let within = (0..n).filter(is_within).count();
+    let cells = n * n - within * within;
+    (cells > 0).then(|| {
+        (
+            format!("beyond {last_deg} degrees"),
+            format!("{} cells of the grid: the value there", count(cells as u64)),
+        )
+    })
+}
+
+/// What a file does not hold, and how much of the grid that is.
+fn gaps_text(gaps: &Gaps, grid: Grid) -> String {
+    let share = 100.0 * gaps.evaluations as f64 / grid.n_cells() as f64;
+    format!(
+        "{} of the file's {} values are {}; {} cells of the grid ({share:.2} %) come from them",
+        count(gaps.missing),
+        count(gaps.of),
+        gaps.instead,
+        count(gaps.evaluations)
+    )
 }

@@ -1,6 +1,8 @@
 //! The command `gonia`. Each command is one file; all end with exit code 0, with 1 after one line
 //! that says what is wrong and what to do, or with 2 for wrong usage.
 
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 mod account;
 mod baselines;
 mod capture;
@@ -12,6 +14,7 @@ mod device;
 mod fill;
 mod fit;
 mod import;
+mod output;
 mod photo;
 mod plan;
 mod plan_adaptive;
@@ -23,6 +26,9 @@ mod remarks;
 mod render;
 mod report;
 mod rivals;
+mod sample_facts;
+mod say;
+mod scale;
 mod sim_device;
 mod table;
 mod verify;
@@ -83,10 +89,10 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    match start(cli) {
+    match start(cli).and_then(|()| say::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("gonia: {}", chain_in_one_line(&error));
+            say::errln!("gonia: {}", chain_in_one_line(&error));
             ExitCode::FAILURE
         }
     }

@@ -1,12 +1,14 @@
 //! `gonia photo`: a photograph of the material beside its render.
 
+use crate::output;
 use crate::progress::Progress;
+use crate::say::errln;
 use crate::table;
 
 use anyhow::{Result, bail};
 use gonia_formats::dense::read_dense;
 use gonia_formats::photo::read_photo;
-use gonia_formats::{check_writable_beside, write_whole_bytes};
+use gonia_formats::write_whole_bytes;
 use gonia_render as render;
 use gonia_render::color::{delta_e, luminance};
 use gonia_render::{Picture, Tabulated, png, tone};
@@ -93,7 +95,7 @@ impl Photo {
         {
             bail!("--light-up must lie in -89..=89 degrees, --light-right in -180..=180");
         }
-        check_writable_beside(&self.output)?;
+        output::check_picture(&self.output, &["png"], &[&self.dense, &self.photo])?;
         let progress = Progress::new();
         let photo = read_photo(&self.photo)?;
         let outline = self.outline.unwrap_or(Outline {
@@ -138,8 +140,8 @@ impl Photo {
             ("ΔE00".into(), format!("mean {:.2}", likeness.delta_e)),
         ]);
         if !likeness.is_cylinder() {
-            eprintln!(
-                "gonia: warning: {}: does not darken from its middle as a cylinder under this light would (correlation of the columns {:.2}); check --box, --light-up and --light-right",
+            errln!(
+                "warning: {}: does not darken from its middle as a cylinder under this light would (correlation of the columns {:.2}); check --box, --light-up and --light-right",
                 self.photo.display(),
                 likeness.across
             );

@@ -1,18 +1,17 @@
 //! `gonia plan`: what a session will do, without doing it.
 
 use crate::plan_adaptive::{expectation, propose};
-use crate::table;
+use crate::{output, remarks, table};
 use anyhow::{Result, bail};
 use gonia_acquire::capture::{SETTLE_TIME_S, keep_apart, travelling, travelling_order};
-use gonia_formats::check_writable_beside;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_imaging::SamplingGrid;
 use gonia_plan as plan;
 use gonia_plan::{RingList, Rings};
 use gonia_protocol::settings::{Axis, Key};
-use gonia_rig::Rig;
-use std::path::PathBuf;
+use gonia_rig::{Rig, rig_remarks};
+use std::path::{Path, PathBuf};
 
 /// Bytes of a pixel in a frame's file: three half floats.
 const BYTES_A_PIXEL: u64 = 6;
@@ -59,6 +58,7 @@ impl Plan {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let rig = read_rig(&self.rig)?;
+        remarks::print(&rig_remarks(self.rig.display(), &rig));
         if !(0.0..=86_400.0).contains(&self.dwell) {
             bail!("--dwell {}: must lie in 0..=86400 seconds", self.dwell);
         }
@@ -69,7 +69,9 @@ impl Plan {
             bail!("--add {}: must lie in 1..={ADD_MAX} poses", self.add);
         }
         if let Some(path) = &self.output {
-            check_writable_beside(path)?;
+            let samples = self.adaptive.iter().map(PathBuf::as_path);
+            let inputs: Vec<&Path> = samples.chain([&*self.rig]).collect();
+            output::check_table(path, &inputs)?;
         }
         let (mut plan, proposed) = if self.adaptive.is_empty() {
             let mut rings = Rings::paper();

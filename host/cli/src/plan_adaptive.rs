@@ -28,7 +28,7 @@ const LIGHT_MAX_DEG: f64 = 85.0;
 /// Samples that cannot be read, or that do not say their frames, or of too few frames.
 pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> Result<Proposal> {
     let progress = Progress::new();
-    let read = progress.stage("reading samples", |_| read_samples_of_all(samples))?;
+    let read = progress.stage("reading samples", |_| read_samples_of_all(samples, None))?;
     remarks::print(&read.remarks);
     let measured = poses_of(&read.samples);
     if measured.is_empty() {
@@ -39,7 +39,7 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
     }
     let set = SampleSet {
         samples: read.samples,
-        scale: Scale::Relative,
+        scale: read.scale.unwrap_or(Scale::Relative),
     };
     let options = FillOptions {
         with_errors: true,

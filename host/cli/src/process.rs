@@ -1,13 +1,14 @@
 //! `gonia process`: frames → samples.
 
 use crate::progress::Progress;
-use crate::{account, table};
+use crate::{account, remarks, sample_facts, table};
 use anyhow::{Result, bail};
-use gonia_acquire::session::SessionFolder;
-use gonia_formats::samples::write_samples;
-use gonia_formats::{CaptureFolder, check_writable_beside};
+use gonia_acquire::session::{RIG, SessionFolder};
+use gonia_formats::samples::{check_sample_name, write_noted_samples};
+use gonia_formats::{CaptureFolder, check_output};
 use gonia_pipeline::process::{MASKS, Masks};
 use gonia_pipeline::samples_of;
+use gonia_rig::rig_remarks;
 use std::path::PathBuf;
 
 /// Registers each frame by its fiducial lines, samples it, and calibrates it against the reference.
@@ -34,10 +35,11 @@ impl Process {
             .output
             .clone()
             .unwrap_or_else(|| self.folder.join("samples.npy"));
-        check_writable_beside(&output)?;
+        check_sample_name(&output)?;
+        check_output(&output, &[&self.folder.join("frames.csv")])?;
         let progress = Progress::new();
         let has_frames = self.folder.join("frames.csv").is_file();
-        let (rig, processed) = if SessionFolder::is_session(&self.folder) && !has_frames {
+        let (rig, processed, facts) = if SessionFolder::is_session(&self.folder) && !has_frames {
             if self.masks.is_some() {
                 bail!(
                     "--masks: the frames of a session are sampled already, and masks come too late"
@@ -45,19 +47,22 @@ impl Process {
             }
             let session = SessionFolder::open(&self.folder)?;
             let processed = session.samples(&progress.watch())?;
-            (session.rig().clone(), processed)
+            let facts = sample_facts::of_session("gonia process", &session);
+            (session.rig().clone(), processed, facts)
         } else {
             let folder = CaptureFolder::open(&self.folder)?;
+            let facts = sample_facts::of_capture_folder("gonia process", &self.folder)?;
             let kept = self.folder.join(MASKS);
             let masks = match self.masks.or(kept.is_file().then_some(kept)) {
                 Some(path) => Masks::read(&path, folder.rig())?,
                 None => Masks::default(),
             };
             let processed = samples_of(folder.rig(), &folder, &masks, &progress.watch())?;
-            (folder.rig().clone(), processed)
+            (folder.rig().clone(), processed, facts)
         };
+        remarks::print(&rig_remarks(self.folder.join(RIG).display(), &rig));
         progress.stage("writing samples", |_| {
-            write_samples(&output, &processed.samples)
+            write_noted_samples(&output, &processed.samples, &processed.note(facts))
         })?;
         if !processed.masks.is_empty() {
             processed.masks.write(&output.with_file_name(MASKS), &rig)?;

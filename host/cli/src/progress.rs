@@ -1,5 +1,6 @@
 //! Says which step a command is in, and how long it still takes.
 
+use crate::say::errln;
 use gonia_formats::Stage;
 use gonia_pipeline::Step;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -100,7 +101,7 @@ impl Progress {
         bar.finish_and_clear();
         if well {
             let seconds = start.elapsed().as_secs_f64();
-            eprintln!("{name:<28} {seconds:>8.1} s");
+            errln!("{name:<28} {seconds:>8.1} s");
             self.state().done.push(Stage {
                 name: name.to_owned(),
                 seconds,

@@ -1,8 +1,11 @@
 //! `gonia query`: values at any directions.
 
+use crate::{remarks, say};
 use anyhow::{Context, Result, bail};
-use gonia_brdf::Direction;
+use csv::StringRecord;
+use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
+use gonia_rig::Remark;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
@@ -13,7 +16,7 @@ const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_v", "phi_v"];
 /// degrees) and writes them with r, g, b, interpolated between the nodes.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr"
+    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
 )]
 pub struct Query {
     /// The dense BRDF
@@ -24,7 +27,6 @@ impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let mut brdf = DenseLookup::open(&self.dense)?;
-        let last_deg = (brdf.grid().n_theta() - 1) as f64 * brdf.grid().step_deg();
         let mut input = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(std::io::stdin().lock());
@@ -38,48 +40,99 @@ impl Query {
                 )
             })?;
         }
+        let mut beyond = Beyond::of(brdf.grid());
         let mut out = BufWriter::new(std::io::stdout().lock());
-        writeln!(out, "{},r,g,b", ANGLES.join(","))?;
-        let mut beyond = 0usize;
+        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
         for record in input.records() {
+            if said.is_err() {
+                break;
+            }
             let record = record.context("standard input")?;
             let line = record.position().map_or(0, |p| p.line());
-            let mut angles = [0.0f64; 4];
-            for k in 0..4 {
-                let text = record.get(columns[k]).unwrap_or_default();
-                angles[k] = match text.parse::<f64>() {
-                    Ok(value) if value.is_finite() => value,
-                    _ => bail!(
-                        "standard input, line {line}: '{text}' in column {} is not a number of degrees",
-                        ANGLES[k]
-                    ),
-                };
-            }
+            let angles = angles_of(&record, &columns, line)?;
             let [theta_i, phi_i, theta_v, phi_v] = angles;
-            for (name, theta) in [("theta_i", theta_i), ("theta_v", theta_v)] {
-                if !(0.0..=90.0).contains(&theta) {
-                    bail!(
-                        "standard input, line {line}: {name} = {theta} is not a polar angle in 0..=90 degrees"
-                    );
-                }
-            }
-            beyond += usize::from(theta_i.max(theta_v) > last_deg);
-            let rgb = brdf.lookup(
+            beyond.count(angles, line);
+            let [r, g, b] = brdf.lookup(
                 Direction::from_deg(theta_i, phi_i),
                 Direction::from_deg(theta_v, phi_v),
             )?;
-            writeln!(
-                out,
-                "{theta_i},{phi_i},{theta_v},{phi_v},{},{},{}",
-                rgb[0], rgb[1], rgb[2]
-            )?;
+            said = writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}");
         }
-        out.flush()?;
-        if beyond > 0 {
-            eprintln!(
-                "{beyond} directions lie above the grid's last polar angle, {last_deg} degrees: they got its value"
+        say::written(said.and_then(|()| out.flush()))?;
+        remarks::print(beyond.remark().as_slice());
+        Ok(())
+    }
+}
+
+/// The four angles of a row, degrees.
+fn angles_of(record: &StringRecord, columns: &[usize; 4], line: u64) -> Result<[f64; 4]> {
+    let mut angles = [0.0f64; 4];
+    for (k, name) in ANGLES.into_iter().enumerate() {
+        let text = record.get(columns[k]).unwrap_or_default();
+        angles[k] = match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => value,
+            _ => bail!(
+                "standard input, line {line}: '{text}' in column {name} is not a number of degrees; \
+                 give one, with a point for decimals"
+            ),
+        };
+        let is_polar = name.starts_with("theta");
+        if is_polar && !(0.0..=90.0).contains(&angles[k]) {
+            let remedy = match angles[k] {
+                theta if (-90.0..0.0).contains(&theta) => {
+                    "give its size, and the azimuth plus 180 degrees"
+                }
+                _ => "give degrees from the normal",
+            };
+            bail!(
+                "standard input, line {line}: {name} = {text} is not a polar angle in 0..=90 degrees; {remedy}"
             );
         }
-        Ok(())
+    }
+    Ok(angles)
+}
+
+/// Directions beyond the grid's last polar angle, which have its value.
+struct Beyond {
+    last_deg: f64,
+    asked: usize,
+    beyond: usize,
+    /// The line, the column and the polar angle of the first.
+    first: Option<(u64, &'static str, f64)>,
+}
+
+impl Beyond {
+    fn of(grid: Grid) -> Self {
+        Self {
+            last_deg: (grid.n_theta() - 1) as f64 * grid.step_deg(),
+            asked: 0,
+            beyond: 0,
+            first: None,
+        }
+    }
+
+    fn count(&mut self, [theta_i, _, theta_v, _]: [f64; 4], line: u64) {
+        // Angles that were radians once may be off in their last digits.
+        let is_beyond = |theta: f64| theta > self.last_deg + 1e-6;
+        let found = [(ANGLES[0], theta_i), (ANGLES[2], theta_v)]
+            .into_iter()
+            .find(|(_, theta)| is_beyond(*theta));
+        self.asked += 1;
+        if let Some((name, theta)) = found {
+            self.beyond += 1;
+            self.first.get_or_insert((line, name, theta));
+        }
+    }
+
+    fn remark(&self) -> Option<Remark> {
+        let (line, name, theta) = self.first?;
+        Some(Remark::new(
+            "standard input",
+            format_args!(
+                "{} of {} directions lie beyond the grid's last polar angle, {} degrees (the first in line {line}: {name} = {theta}): they have the value there",
+                self.beyond, self.asked, self.last_deg
+            ),
+            "do not take those values for measured or interpolated ones",
+        ))
     }
 }

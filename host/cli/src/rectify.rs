@@ -1,8 +1,10 @@
 //! `gonia rectify`: one frame as seen from straight above.
 
+use crate::output;
+use crate::say::outln;
 use anyhow::{Result, bail};
 use gonia_formats::frame_exr::{Precision, write_frame_as};
-use gonia_formats::{CaptureFolder, FileError, check_writable_beside, write_whole_bytes};
+use gonia_formats::{CaptureFolder, FileError, write_whole_bytes};
 use gonia_imaging::hdr::Radiance;
 use gonia_imaging::rectify::{View, rectify, rectify_variance};
 use gonia_imaging::{Registrar, Registration, RegistrationState};
@@ -58,11 +60,11 @@ impl Rectify {
                 view.side_px
             );
         }
-        let is_exr = has_extension(&self.output, "exr");
-        if !is_exr && !has_extension(&self.output, "png") {
-            bail!("{}: end the name in .exr or .png", self.output.display());
+        output::check_picture(&self.output, &["exr", "png"], &[])?;
+        if let Some(variance) = &self.variance {
+            output::check_picture(variance, &["exr"], &[])?;
         }
-        check_writable_beside(&self.output)?;
+        let is_exr = output::ends_in(&self.output, "exr");
         let radiance = self.load(&folder)?;
         let Radiance {
             mut frame,
@@ -70,7 +72,7 @@ impl Rectify {
             linearity,
         } = radiance;
         if let Some(worst) = linearity {
-            println!(
+            outln!(
                 "exposures     {} s and {} s differ the most, by {:+.2} %",
                 worst.shorter_s,
                 worst.longer_s,
@@ -100,11 +102,11 @@ impl Rectify {
         } else {
             write_png(&self.output, &frame)?;
         }
-        println!("written       {}", self.output.display());
+        outln!("written       {}", self.output.display());
         if let Some(path) = &self.variance {
             // Half precision does not reach far enough down for squares.
             write_frame_as(path, &variance, Precision::Single)?;
-            println!("variance      {}", path.display());
+            outln!("variance      {}", path.display());
         }
         Ok(())
     }
@@ -153,7 +155,7 @@ impl Rectify {
     fn register(&self, folder: &CaptureFolder, frame: &Frame) -> Result<Registration> {
         let registration = Registrar::new(folder.rig()).register(frame, self.row(folder)?.pose);
         match registration.state {
-            RegistrationState::Locked => println!(
+            RegistrationState::Locked => outln!(
                 "registered    by {} lines to {:.3} px, blur {:.2} px, camera {:+.4}, {:+.4} degrees from its reading (theta, phi)",
                 registration.lines_found,
                 registration.residual_px,
@@ -161,15 +163,10 @@ impl Rectify {
                 registration.pose_offset.theta_deg,
                 registration.pose_offset.phi_deg
             ),
-            RegistrationState::FellBack(reason) => println!("registered    by its pose: {reason}"),
+            RegistrationState::FellBack(reason) => outln!("registered    by its pose: {reason}"),
         }
         Ok(registration)
     }
-}
-
-fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }
 
 /// Writes a picture for the screen, exposed so that few pixels are white.

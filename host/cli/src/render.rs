@@ -1,5 +1,6 @@
 //! `gonia render`: what a material looks like.
 
+use crate::output;
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Brdf;
@@ -7,7 +8,7 @@ use gonia_brdf::Elementary;
 use gonia_formats::dense::read_dense;
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::photo::read_photo;
-use gonia_formats::{check_writable_beside, write_whole_bytes};
+use gonia_formats::write_whole_bytes;
 use gonia_render as render;
 use gonia_render::{Environment, Light, Picture, Tabulated, png, tone};
 use gonia_rig::Frame;
@@ -67,11 +68,11 @@ impl Render {
         if !(-20.0..=20.0).contains(&self.exposure) {
             bail!("--exposure {}: must lie in -20..=20 stops", self.exposure);
         }
-        for path in [Some(&self.output), self.linear.as_ref()]
-            .into_iter()
-            .flatten()
-        {
-            check_writable_beside(path)?;
+        let environment = Path::new(&self.light);
+        let inputs = [&*self.dense, environment];
+        output::check_picture(&self.output, &["png"], &inputs)?;
+        if let Some(linear) = &self.linear {
+            output::check_picture(linear, &["exr"], &inputs)?;
         }
         let lights = lights_of(&self.light, self.lights)?;
         let progress = Progress::new();

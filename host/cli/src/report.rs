@@ -2,10 +2,13 @@
 
 use crate::baselines::make_and_print;
 use crate::progress::Progress;
+use crate::remarks;
+use crate::say::outln;
 use anyhow::Result;
 use gonia_brdf::fit::FitSettings;
-use gonia_formats::check_writable;
+use gonia_formats::{check_writable, check_writable_beside};
 use gonia_pipeline::baselines::BaselineOptions;
+use gonia_report::files::REPORT;
 use gonia_report::report_folder;
 use std::path::PathBuf;
 
@@ -31,6 +34,10 @@ impl Report {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let progress = Progress::new();
+        // A folder that is not there is not made.
+        if self.folder.is_dir() {
+            check_writable_beside(&self.folder.join(REPORT))?;
+        }
         if let Some(figures) = &self.figures {
             check_writable(figures)?;
         }
@@ -41,11 +48,12 @@ impl Report {
             };
             make_and_print(&self.folder, None, &options)?;
         }
-        let written = progress.stage("drawing the report", |_| {
+        let drawn = progress.stage("drawing the report", |_| {
             report_folder(&self.folder, self.figures.as_deref())
         })?;
-        for path in written {
-            println!("{}", path.display());
+        remarks::print(&drawn.remarks);
+        for path in drawn.written {
+            outln!("{}", path.display());
         }
         Ok(())
     }

@@ -81,6 +81,7 @@ fn gige(
 #[cfg(unix)]
 mod ptys {
     use super::Result;
+    use crate::say::{errln, outln};
     use anyhow::{Context, bail};
     use gonia_brdf::Pose;
     use gonia_brdf::model::Kurt;
@@ -126,7 +127,7 @@ mod ptys {
                 let frame = scene.frame(Role::Material, pose, number as u64);
                 let path = folder.join(format!("{number:06}.exr"));
                 if let Err(error) = write_frame(&path, &frame) {
-                    eprintln!("gonia: {error}");
+                    errln!("gonia: {error}");
                 }
             }
         });
@@ -147,14 +148,13 @@ mod ptys {
             let Some(path) = slave.name() else {
                 bail!("the pseudo-terminal has no name");
             };
-            println!("{name}  {path}");
+            outln!("{name}  {path}");
             ports.push(ArmPort {
                 port: rig.port(arm),
                 master,
                 _slave: slave,
             });
         }
-        std::io::stdout().flush()?;
         let began = Instant::now();
         loop {
             for port in &mut ports {

@@ -1,10 +1,12 @@
 //! A plain two-column table on standard output.
 
+use crate::say::outln;
+
 /// Prints rows as `name  value`, the values aligned.
 pub fn print(rows: &[(String, String)]) {
     let width = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0);
     for (name, value) in rows {
-        println!("{name:<width$}  {value}");
+        outln!("{name:<width$}  {value}");
     }
 }
 

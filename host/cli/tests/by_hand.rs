@@ -8,6 +8,7 @@ use common::{gonia_ok, text};
 use gonia_brdf::Elementary;
 use gonia_brdf::Sample;
 use gonia_formats::samples::read_samples;
+use gonia_rig::Scale;
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -140,9 +141,9 @@ fn a_known_reference_gives_absolute_values_under_an_uneven_lamp() {
     write_folder(folder.path(), &rig, true, 0.4);
     let printed = gonia_ok(&["process", text(folder.path())], "");
     assert!(printed.contains("absolute"), "{printed}");
-    let samples = read_samples(&folder.path().join("samples.npy"))
-        .unwrap()
-        .samples;
+    let read = read_samples(&folder.path().join("samples.npy")).unwrap();
+    assert_eq!((read.scale, read.remarks), (Some(Scale::Absolute), vec![]));
+    let samples = read.samples;
     for (k, (pose, albedo)) in POSES.iter().enumerate() {
         let here = of_frame(&samples, 10 + k as u32);
         assert!(here.len() >= 1200, "{} of 1225 points", here.len());
@@ -172,7 +173,9 @@ fn without_a_reference_values_follow_the_ideal_light_and_say_so() {
     let output = folder.path().join("out.csv");
     let printed = gonia_ok(&["process", text(folder.path()), "-o", text(&output)], "");
     assert!(printed.contains("relative"), "{printed}");
-    let samples = read_samples(&output).unwrap().samples;
+    let read = read_samples(&output).unwrap();
+    assert_eq!((read.scale, read.remarks), (Some(Scale::Relative), vec![]));
+    let samples = read.samples;
     for (k, (_, albedo)) in POSES.iter().enumerate() {
         let here = of_frame(&samples, 10 + k as u32);
         assert!(here.len() >= 1200, "{} of 1225 points", here.len());

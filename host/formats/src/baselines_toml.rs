@@ -9,6 +9,10 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BaselineTable {
+    /// Checksum of the values of the dense BRDF that they were compared with, see
+    /// [`checksum::of_brdf`](crate::checksum::of_brdf); absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dense: Option<String>,
     /// One a baseline, in the order of the table.
     pub rows: Vec<BaselineRow>,
 }

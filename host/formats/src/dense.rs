@@ -11,6 +11,10 @@ use gonia_rig::{DenseFile, Scale};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Name of the fact in the provenance of error bars that holds the checksum of the dense BRDF that they
+/// belong to ([`checksum::of_brdf`](crate::checksum::of_brdf)).
+pub const ERRORS_OF: &str = "dense";
+
 /// Reads a dense BRDF, gonia's or anybody's of a grid's size.
 ///
 /// # Errors
@@ -61,6 +65,12 @@ pub fn write_error_bars(
 ) -> Result<(), FileError> {
     (writer_of_name(path)?.error_bars)(path, grid, bars, scale, provenance)
 }
+
+/// Endings that people take for another kind of file than the one that would be written.
+const OTHER_KINDS: [&str; 22] = [
+    "png", "jpg", "jpeg", "tif", "tiff", "hdr", "bmp", "gif", "npz", "h5", "hdf5", "nc", "mat",
+    "txt", "json", "toml", "xml", "html", "svg", "bsdf", "zip", "gz",
+];
 
 /// Whether a dense BRDF can be written under this name, before it is made.
 ///
@@ -149,10 +159,12 @@ fn format_of_file(path: &Path) -> Result<&'static DenseFormat, FileError> {
 }
 
 fn writer_of_name(path: &Path) -> Result<&'static DenseWriter, FileError> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let is_other = OTHER_KINDS.iter().any(|other| ending == *other);
     let named = table::format_of_name(path);
     let format = named.or_else(|| table::formats(is_dense).next());
     let writer = format.and_then(|format| match &format.content {
-        Content::Dense(dense) => dense.write.as_ref(),
+        Content::Dense(dense) if !is_other => dense.write.as_ref(),
         _ => None,
     });
     writer.ok_or_else(|| {
@@ -209,9 +221,9 @@ mod tests {
         for name in ["dense.exr", "DENSE.EXR", "dense", "dense.out"] {
             assert_eq!(check_dense_name(Path::new(name)), Ok(()));
         }
-        let error = check_dense_name(Path::new("a.npy"))
-            .unwrap_err()
-            .to_string();
-        assert!(error.ends_with("name it .exr"), "{error}");
+        for name in ["a.npy", "a.PNG", "a.h5"] {
+            let error = check_dense_name(Path::new(name)).unwrap_err().to_string();
+            assert!(error.ends_with("name it .exr"), "{error}");
+        }
     }
 }

@@ -69,7 +69,7 @@ impl FileError {
             io::ErrorKind::NotFound => "check the path",
             io::ErrorKind::PermissionDenied => "make it readable for this user",
             io::ErrorKind::IsADirectory => "name a file, not a folder",
-            _ => "check the disk and try again",
+            _ => of_the_system(error).unwrap_or("check the disk and try again"),
         };
         Self::new(path, format_args!("cannot be read ({error})"), remedy).caused_by(copy_of(error))
     }
@@ -86,7 +86,7 @@ impl FileError {
             }
             io::ErrorKind::IsADirectory => "choose a name that is not a folder's",
             io::ErrorKind::NotADirectory => "choose a place inside a folder",
-            _ => "check the disk and try again",
+            _ => of_the_system(error).unwrap_or("check the disk and try again"),
         };
         Self::new(path, format_args!("cannot be written ({error})"), remedy)
             .caused_by(copy_of(error))
@@ -118,6 +118,27 @@ impl Error for FileError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         let cause = self.cause.0.as_deref()?;
         Some(cause)
+    }
+}
+
+/// What to do about an error that has nothing to do with the file.
+fn of_the_system(error: &io::Error) -> Option<&'static str> {
+    /// Unix: no more files for this process, for the system.
+    const TOO_MANY_FILES: [i32; 2] = [24, 23];
+    if cfg!(unix)
+        && error
+            .raw_os_error()
+            .is_some_and(|code| TOO_MANY_FILES.contains(&code))
+    {
+        return Some("raise the limit of open files (ulimit -n) or close other programs");
+    }
+    match error.kind() {
+        io::ErrorKind::InvalidFilename => Some("choose a shorter name"),
+        io::ErrorKind::OutOfMemory => Some("close other programs: memory has run out"),
+        io::ErrorKind::StaleNetworkFileHandle | io::ErrorKind::TimedOut => {
+            Some("check that the network's disk is there")
+        }
+        _ => None,
     }
 }
 
@@ -172,5 +193,21 @@ mod tests {
             say(io::ErrorKind::StorageFull).ends_with("free some space or choose another disk")
         );
         assert!(say(io::ErrorKind::NotFound).ends_with("make its folder first"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn too_many_open_files_are_no_fault_of_the_disk() {
+        let many = io::Error::from_raw_os_error(24);
+        for error in [
+            FileError::reading(Path::new("x"), &many),
+            FileError::writing(Path::new("x"), &many),
+        ] {
+            let said = error.to_string();
+            assert!(
+                said.contains("Too many open files") && said.contains("ulimit"),
+                "{said}"
+            );
+        }
     }
 }

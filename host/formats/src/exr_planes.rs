@@ -111,6 +111,7 @@ pub(super) fn read(
     }
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     check(width, height).map_err(|(problem, remedy)| FileError::new(path, problem, remedy))?;
+    check_promise(path, header)?;
     let attributes = text_attributes(header);
 
     let image = exr::prelude::read()
@@ -129,6 +130,37 @@ pub(super) fn read(
         extra: None,
         attributes,
     })
+}
+
+/// Pixels of fewer bytes than this are never refused: memory for them is there.
+const HARMLESS_BYTES: u64 = 1 << 28;
+/// An EXR is packed no tighter than this: zlib's limit is 1032, and other kinds come near it.
+const TIGHTEST: u64 = 2000;
+
+/// Refuses a header that promises more than the file can hold, before memory is asked for it.
+fn check_promise(path: &Path, header: &exr::meta::header::Header) -> Result<(), FileError> {
+    let length = std::fs::metadata(path).map_err(|error| FileError::reading(path, &error))?;
+    let length = length.len();
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    let channels = header.channels.list.iter();
+    let bytes_a_pixel: usize = channels.map(|c| c.sample_type.bytes_per_sample()).sum();
+    let promised = [height, bytes_a_pixel]
+        .iter()
+        .fold(width as u64, |all, n| all.saturating_mul(*n as u64));
+    let tightest = match header.compression {
+        Compression::Uncompressed => 1,
+        _ => TIGHTEST,
+    };
+    if promised <= HARMLESS_BYTES || promised <= tightest * length {
+        return Ok(());
+    }
+    Err(FileError::new(
+        path,
+        format_args!(
+            "is cut short or damaged: its header promises {width} × {height} pixels, which its {length} bytes cannot hold"
+        ),
+        "copy or make it again",
+    ))
 }
 
 fn missing_channel(path: &Path, name: &str, header: &exr::meta::header::Header) -> FileError {

@@ -146,7 +146,11 @@ impl RowReader {
             let end = offset.checked_add(ROW_HEAD + 12 * side as u64);
             end.is_some_and(|end| end <= length)
         };
-        let is_whole = offsets.len() == side && offsets.iter().all(whole);
+        // Rows that share their bytes would be a small file of a large image.
+        let holds_all = (side as u64)
+            .checked_mul(ROW_HEAD + 12 * side as u64)
+            .is_some_and(|bytes| bytes <= length);
+        let is_whole = holds_all && offsets.len() == side && offsets.iter().all(whole);
         is_whole.then_some(Self {
             file,
             offsets,

@@ -23,6 +23,10 @@ pub struct FitNote {
     pub cells: u64,
     /// Seconds the search took.
     pub seconds: f64,
+    /// Checksum of the values of the dense BRDF that it was fitted to, see
+    /// [`checksum::of_brdf`](crate::checksum::of_brdf); absent in notes of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dense: Option<String>,
     /// The model's numbers.
     pub parameters: Vec<FittedNumber>,
     /// The model against what it was fitted to.
@@ -60,6 +64,7 @@ impl FitNote {
             residual_rms: fit.residual_rms,
             cells: fit.cells as u64,
             seconds,
+            dense: None,
             parameters: numbers
                 .map(|(k, p)| FittedNumber {
                     value: fit.values[k],
@@ -87,11 +92,11 @@ impl FitNote {
         toml_text::read(path, "make it again with gonia fit")
     }
 
-    /// All notes of a folder, by name; none where the folder cannot be listed.
+    /// All notes of a folder with their files, by name; none where the folder cannot be listed.
     ///
     /// # Errors
     /// As [`FitNote::read`].
-    pub fn read_all(folder: &Path) -> Result<Vec<Self>, FileError> {
+    pub fn read_all(folder: &Path) -> Result<Vec<(PathBuf, Self)>, FileError> {
         let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
             .into_iter()
             .flatten()
@@ -99,7 +104,8 @@ impl FitNote {
             .filter(|path| path.to_string_lossy().ends_with(ENDING))
             .collect();
         paths.sort();
-        paths.iter().map(|path| Self::read(path)).collect()
+        let read = |path: PathBuf| Self::read(&path).map(|note| (path, note));
+        paths.into_iter().map(read).collect()
     }
 
     /// Writes the note whole.
@@ -124,6 +130,7 @@ mod tests {
             residual_rms: 0.1,
             cells: 12_000,
             seconds: 2.5,
+            dense: Some("e3069283".into()),
             parameters: vec![FittedNumber {
                 name: "mx1".into(),
                 value: 0.14,
@@ -153,7 +160,10 @@ mod tests {
         let path = FitNote::path_beside(&dir.path().join("kurt2.exr"));
         assert!(path.ends_with("kurt2.fit.toml"));
         note().write(&path).unwrap();
-        assert_eq!(FitNote::read_all(dir.path()), Ok(vec![note()]));
+        assert_eq!(
+            FitNote::read_all(dir.path()),
+            Ok(vec![(path.clone(), note())])
+        );
         std::fs::write(&path, "model = 3").unwrap();
         let error = FitNote::read_all(dir.path()).unwrap_err().to_string();
         assert!(error.contains("kurt2.fit.toml, line 1"), "{error}");

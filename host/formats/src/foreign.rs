@@ -1,6 +1,6 @@
 //! Other groups' formats, for `gonia import`.
 
-pub use crate::format::{ForeignContent, ForeignFormat};
+pub use crate::format::{ForeignBrdf, ForeignContent, ForeignFormat, Gaps};
 
 use crate::format::Content;
 use crate::{FileError, table};

@@ -92,6 +92,15 @@ pub struct SamplesRead {
     pub remarks: Vec<Remark>,
 }
 
+/// What is known of samples beside their rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SampleNote {
+    /// Whether their values are 1/sr, where that is known.
+    pub scale: Option<Scale>,
+    /// Where they came from, by name: what made them, rig, plan, versions.
+    pub provenance: BTreeMap<String, String>,
+}
+
 impl From<Vec<Sample>> for SamplesRead {
     fn from(samples: Vec<Sample>) -> Self {
         Self {
@@ -101,12 +110,17 @@ impl From<Vec<Sample>> for SamplesRead {
     }
 }
 
+/// Writes samples whole, and what is known of them.
+pub(crate) type WriteSamples = fn(&Path, &[Sample], Option<&SampleNote>) -> Result<(), FileError>;
+
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
     pub read: fn(&Path) -> Result<SamplesRead, FileError>,
-    /// Writes a file whole.
-    pub write: fn(&Path, &[Sample]) -> Result<(), FileError>,
+    /// Writes a file whole, with what is known of the samples where it can hold that.
+    pub write: WriteSamples,
+    /// Whether it can.
+    pub holds_notes: bool,
 }
 
 /// A format of another group, which `gonia import` reads.
@@ -121,14 +135,38 @@ pub struct ForeignFormat {
 pub enum ForeignContent {
     /// A BRDF that has a value for every pair of directions.
     Brdf {
-        /// Whether its values are 1/sr.
-        scale: Scale,
+        /// Whether its values are 1/sr; `None` where nobody knows.
+        scale: Option<Scale>,
         /// Reads a file, which may fail with one line that names it.
-        read: fn(&Path) -> Result<Box<dyn Brdf>, FileError>,
+        read: fn(&Path) -> Result<Box<dyn ForeignBrdf>, FileError>,
     },
     /// Samples, with directions that were not measured.
     Samples {
         /// Reads a file, which may fail with one line that names it.
         read: fn(&Path) -> Result<Vec<Sample>, FileError>,
     },
+}
+
+/// Another group's BRDF, with what its file does not hold.
+pub trait ForeignBrdf: Brdf {
+    /// Values that the file does not hold, and what became of them; `None` where it holds all.
+    fn gaps(&self) -> Option<Gaps>;
+
+    /// The last polar angle that the file holds, degrees: beyond it values are those there.
+    fn last_deg(&self) -> f64 {
+        90.0
+    }
+}
+
+/// Values that a file does not hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gaps {
+    /// Values without a measurement.
+    pub missing: u64,
+    /// All values of the file.
+    pub of: u64,
+    /// What stands in their place.
+    pub instead: &'static str,
+    /// Evaluations so far that such a value went into.
+    pub evaluations: u64,
 }

@@ -11,6 +11,7 @@
 //! | [`foreign`] | other groups' measurements, to be imported |
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
 //! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`] | what a session is made by and leaves behind |
+//! | [`checksum`] | what ties a note to the file that it was written of |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
 //!
@@ -20,6 +21,7 @@
 pub mod baselines_toml;
 mod capture_folder;
 pub mod cell_mask;
+pub mod checksum;
 mod csv_table;
 pub mod dense;
 mod dense_exr;
@@ -43,6 +45,7 @@ pub mod raw_frame;
 mod read_at;
 mod reflectance_csv;
 pub mod rig_toml;
+mod sample_note;
 mod sample_rows;
 pub mod samples;
 mod samples_csv;
@@ -58,4 +61,6 @@ pub use error::{FileError, one_line};
 pub use summary::{
     BinCounts, CellCounts, FileNote, FrameCounts, Pointing, PoseCounts, Refused, Stage, Summary,
 };
-pub use whole_file::{check_writable, check_writable_beside, write_whole, write_whole_bytes};
+pub use whole_file::{
+    check_output, check_writable, check_writable_beside, write_whole, write_whole_bytes,
+};

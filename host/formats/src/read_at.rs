@@ -1,7 +1,32 @@
-//! Reads at a place of a file, from several threads at once, on every system.
+//! Reads at a place of a file, from several threads at once, on every system; and reads of files whose
+//! length is known.
 
+use crate::FileError;
 use std::fs::File;
 use std::io;
+use std::path::Path;
+
+/// All bytes of a file that must have one of some lengths; of any other file none is read.
+///
+/// # Errors
+/// When the system reports one, or the length is none of `lengths`.
+pub(super) fn read_of_length(
+    path: &Path,
+    lengths: &[usize],
+    remedy: &str,
+) -> Result<Vec<u8>, FileError> {
+    let reading = |error| FileError::reading(path, &error);
+    let length = std::fs::metadata(path).map_err(reading)?.len();
+    let wrong = |length: u64| FileError::new(path, format_args!("holds {length} bytes"), remedy);
+    if !lengths.iter().any(|wanted| *wanted as u64 == length) {
+        return Err(wrong(length));
+    }
+    let bytes = std::fs::read(path).map_err(reading)?;
+    if lengths.contains(&bytes.len()) {
+        return Ok(bytes);
+    }
+    Err(wrong(bytes.len() as u64))
+}
 
 /// Fills a buffer from `offset` on, wherever the file's cursor is.
 ///

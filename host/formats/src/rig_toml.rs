@@ -12,7 +12,7 @@ const REMEDY: &str = "docs/src/reference/files/rig.md has the keys and their uni
 /// # Errors
 /// One line naming the file and the line or key: unreadable, not TOML, an unknown, missing or
 /// mistyped key, or a value that no rig has (a distance of zero, a sample larger than its fiducial lines, a
-/// reflectance above one).
+/// reflectance above 1.1).
 pub fn read_rig(path: &Path) -> Result<Rig, FileError> {
     let mut rig: Rig = toml_text::read(path, REMEDY)?;
     if let Some(Reference::Table { file, table }) = &mut rig.reference {
@@ -191,7 +191,7 @@ mod tests {
             let error = read_text(&text.replace(from, to)).unwrap_err().to_string();
             assert!(error.contains(&format!("key {key}:")), "{to}: {error}");
         }
-        for rho in ["0.0", "1.01", "-0.5", "nan"] {
+        for rho in ["0.0", "1.11", "-0.5", "nan"] {
             let text = format!(
                 "{}\n[reference]\nreflectance = [0.9, {rho}, 0.9]\n",
                 paper_text()

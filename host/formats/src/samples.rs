@@ -4,12 +4,13 @@
 //! Columns: `theta_i, phi_i, theta_v, phi_v` in degrees, `r, g, b`, and optionally `frame`, −1
 //! where it is unknown.
 
-pub use crate::format::SamplesRead;
+pub use crate::format::{SampleNote, SamplesRead};
 
 use crate::format::{Content, SampleFormat};
 use crate::sample_rows::LAST_FRAME;
-use crate::{FileError, table};
+use crate::{FileError, sample_note, table};
 use gonia_brdf::Sample;
+use gonia_rig::Scale;
 use std::path::{Path, PathBuf};
 
 /// Reads samples; the format is recognised by the first bytes, else by the ending. Ten million from `.npy` take well below a second.
@@ -19,16 +20,79 @@ use std::path::{Path, PathBuf};
 /// of no known format, another shape, type or order, a value that is not finite, a polar angle outside
 /// 0° ≤ θ ≤ 90°, or a frame number that is none.
 pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
-    (format_of_file(path)?.read)(path)
+    let mut read = (format_of_file(path)?.read)(path)?;
+    sample_note::add_to(&mut read, path)?;
+    Ok(read)
+}
+
+/// The one scale of several files: what they say, or what `said` says of those that do not.
+///
+/// # Errors
+/// A file that says otherwise than `said` or than another file, or says nothing where another does.
+pub fn one_scale(
+    scales: &[(&Path, Option<Scale>)],
+    said: Option<Scale>,
+) -> Result<Option<Scale>, FileError> {
+    let known = scales
+        .iter()
+        .find_map(|(path, scale)| Some((path, (*scale)?)));
+    for (path, scale) in scales {
+        match (scale, said, known) {
+            (Some(scale), Some(said), _) if *scale != said => {
+                return Err(FileError::new(
+                    path,
+                    format_args!("says that its values are {scale}, and --scale says {said}"),
+                    "leave --scale out, or mend what is said of the file",
+                ));
+            }
+            (Some(scale), None, Some((other, first))) if *scale != first => {
+                return Err(FileError::new(
+                    path,
+                    format_args!("is {scale}, but {} is {first}", other.display()),
+                    "give files of one scale together",
+                ));
+            }
+            (None, None, Some((other, first))) => {
+                return Err(FileError::new(
+                    path,
+                    format_args!("does not say its scale, but {} is {first}", other.display()),
+                    format_args!(
+                        "say it with --scale, or in a comment of a .csv (# scale = {first})"
+                    ),
+                ));
+            }
+            _ => {}
+        }
+    }
+    Ok(said.or(known.map(|(_, scale)| scale)))
+}
+
+/// Whether samples can be those behind a dense BRDF, by the scale of both.
+///
+/// # Errors
+/// They say that they have another scale.
+pub fn check_scale(path: &Path, scale: Option<Scale>, dense: Scale) -> Result<(), FileError> {
+    match scale {
+        Some(scale) if scale != dense => Err(FileError::new(
+            path,
+            format_args!("is {scale}, and the dense BRDF is {dense}"),
+            "make that of these samples (gonia fill)",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Reads the samples of several sessions of one material as one: frames are numbered on, so that no
-/// two sessions share a number.
+/// two sessions share a number. `said` is their scale where the files do not say it.
 ///
 /// # Errors
-/// As [`read_samples`], and more frames than a file can number.
-pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<SamplesRead, FileError> {
+/// As [`read_samples`] and [`one_scale`], and more frames than a file can number.
+pub fn read_samples_of_all(
+    paths: &[PathBuf],
+    said: Option<Scale>,
+) -> Result<SamplesRead, FileError> {
     let mut all = SamplesRead::default();
+    let mut scales = Vec::with_capacity(paths.len());
     let mut next = 0u32;
     for path in paths {
         let SamplesRead {
@@ -37,7 +101,7 @@ pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<SamplesRead, FileError> 
             mut remarks,
         } = read_samples(path)?;
         all.remarks.append(&mut remarks);
-        all.scale = all.scale.or(scale);
+        scales.push((path.as_path(), scale));
         let mut last = None;
         for sample in &mut samples {
             if sample.frame != Sample::NO_FRAME {
@@ -61,15 +125,33 @@ pub fn read_samples_of_all(paths: &[PathBuf]) -> Result<SamplesRead, FileError> 
             all.samples.append(&mut samples);
         }
     }
+    all.scale = one_scale(&scales, said)?;
     Ok(all)
 }
 
 /// Writes samples whole, in the format of the name's ending; with frame numbers unless all are unknown.
+/// Nothing is said of them: who reads them does not know their scale.
 ///
 /// # Errors
 /// Another ending, or the file cannot be written.
 pub fn write_samples(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
-    (format_of_name(path)?.write)(path, samples)
+    (format_of_name(path)?.write)(path, samples, None)?;
+    sample_note::write_beside(path, None)
+}
+
+/// As [`write_samples`], with what is known of them: in comments of a `.csv`, in `NAME.npy.toml` beside a
+/// `.npy`, which stays as it is without.
+///
+/// # Errors
+/// As [`write_samples`].
+pub fn write_noted_samples(
+    path: &Path,
+    samples: &[Sample],
+    note: &SampleNote,
+) -> Result<(), FileError> {
+    let format = format_of_name(path)?;
+    (format.write)(path, samples, Some(note))?;
+    sample_note::write_beside(path, (!format.holds_notes).then_some(note))
 }
 
 /// Whether samples can be written under this name, before they are made.
@@ -160,12 +242,45 @@ mod tests {
         let [a, b] = ["a.npy", "b.csv"].map(|name| dir.path().join(name));
         write_samples(&a, &some_samples(2500)).unwrap();
         write_samples(&b, &some_samples(1300)).unwrap();
-        let all = read_samples_of_all(&[a.clone(), b]).unwrap().samples;
+        let all = read_samples_of_all(&[a.clone(), b], None).unwrap().samples;
         assert_eq!(all.len(), 3800);
         assert_eq!(
             (all[2499].frame, all[2500].frame, all[3799].frame),
             (2, 3, 4)
         );
         assert_eq!(all[..2500], read_samples(&a).unwrap().samples);
+    }
+
+    #[test]
+    fn files_of_different_scales_are_not_one_set() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, scale| {
+            let path = dir.path().join(name);
+            let note = SampleNote {
+                scale,
+                ..SampleNote::default()
+            };
+            write_noted_samples(&path, &some_samples(5), &note).unwrap();
+            path
+        };
+        let (absolute, relative) = (Some(Scale::Absolute), Some(Scale::Relative));
+        let [a, r] = [write("a.npy", absolute), write("r.csv", relative)];
+        let unknown = write("u.npy", None);
+        let one = |paths: &[&PathBuf], said| {
+            let paths: Vec<PathBuf> = paths.iter().map(|p| (*p).clone()).collect();
+            read_samples_of_all(&paths, said).map(|read| read.scale)
+        };
+        assert_eq!(one(&[&a, &a], None), Ok(absolute));
+        assert_eq!(one(&[&a, &unknown], absolute), Ok(absolute));
+        assert_eq!(one(&[&unknown], None), Ok(None));
+        for (paths, said, word) in [
+            (vec![&a, &r], None, "give files of one scale"),
+            (vec![&a, &unknown], None, "does not say its scale"),
+            (vec![&r], absolute, "--scale says absolute"),
+            (vec![&unknown, &a], relative, "--scale says relative"),
+        ] {
+            let error = one(&paths, said).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Samples as `.csv`.
 
 use crate::csv_table::CsvTable;
-use crate::format::{Content, Format, SampleFormat, SamplesRead};
+use crate::format::{Content, Format, SampleFormat, SampleNote, SamplesRead};
+use crate::sample_note::write_comments;
 use crate::sample_rows::{COLUMNS, frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, write_whole};
 use gonia_brdf::Sample;
@@ -13,7 +14,11 @@ pub(super) static FORMAT: Format = Format {
     name: "CSV",
     endings: &["csv"],
     magic: &[],
-    content: Content::Samples(SampleFormat { read, write }),
+    content: Content::Samples(SampleFormat {
+        read,
+        write,
+        holds_notes: true,
+    }),
 };
 
 fn read(path: &Path) -> Result<SamplesRead, FileError> {
@@ -36,10 +41,13 @@ fn read(path: &Path) -> Result<SamplesRead, FileError> {
     Ok(samples.into())
 }
 
-fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
+fn write(path: &Path, samples: &[Sample], note: Option<&SampleNote>) -> Result<(), FileError> {
     let with_frames = have_frames(samples);
     let columns = if with_frames { 8 } else { 7 };
     write_whole(path, |out| {
+        if let Some(note) = note {
+            write_comments(out, note)?;
+        }
         writeln!(out, "{}", COLUMNS[..columns].join(","))?;
         for s in samples {
             let [r, g, b] = s.rgb;

@@ -1,6 +1,6 @@
 //! Samples as `.npy`.
 
-use crate::format::{Content, Format, SampleFormat, SamplesRead};
+use crate::format::{Content, Format, SampleFormat, SampleNote, SamplesRead};
 use crate::sample_rows::{frame_in_file, have_frames, sample_from_row};
 use crate::{FileError, npy};
 use gonia_brdf::Sample;
@@ -16,7 +16,11 @@ pub(super) static FORMAT: Format = Format {
     name: "NumPy",
     endings: &["npy"],
     magic: b"\x93NUMPY",
-    content: Content::Samples(SampleFormat { read, write }),
+    content: Content::Samples(SampleFormat {
+        read,
+        write,
+        holds_notes: false,
+    }),
 };
 
 fn read(path: &Path) -> Result<SamplesRead, FileError> {
@@ -54,7 +58,7 @@ fn read(path: &Path) -> Result<SamplesRead, FileError> {
     Ok(samples.into())
 }
 
-fn write(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
+fn write(path: &Path, samples: &[Sample], _: Option<&SampleNote>) -> Result<(), FileError> {
     let columns = if have_frames(samples) { 8 } else { 7 };
     npy::write(path, DTYPE, &[samples.len(), columns], |out| {
         let mut buffer = Vec::with_capacity(ROWS * columns * 4);

@@ -16,6 +16,10 @@ pub struct Summary {
     pub title: String,
     /// Whether the values are 1/sr.
     pub scale: Scale,
+    /// Checksum of the values of the dense BRDF that this is said of, see
+    /// [`checksum::of_brdf`](crate::checksum::of_brdf); absent in summaries of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dense: Option<String>,
     /// Where the data came from: rig, plan, versions, settings, seed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub provenance: BTreeMap<String, String>,
@@ -190,6 +194,7 @@ impl Summary {
         Self {
             title: title.into(),
             scale,
+            dense: None,
             provenance: BTreeMap::new(),
             poses: None,
             frames: None,

@@ -5,11 +5,12 @@
 //! 32 bits, known by their size, are read too.
 
 use crate::FileError;
-use crate::format::{Content, ForeignContent, ForeignFormat, Format};
+use crate::format::{Content, ForeignBrdf, ForeignContent, ForeignFormat, Format, Gaps};
+use crate::read_at::read_of_length;
 use gonia_brdf::direction::Vec3;
 use gonia_brdf::{Brdf, Direction};
-use gonia_rig::Scale;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const N_THETA: usize = 6;
 const N_PHI: usize = 48;
@@ -18,7 +19,7 @@ const PHI_STEP_DEG: f64 = 7.5;
 const SIDE: usize = N_THETA * N_PHI;
 const COUNT: usize = 3 * SIDE * SIDE;
 
-/// The database's format. Its values are relative.
+/// The database's format. Public readers disagree on the scale of its values.
 pub(super) static FORMAT: Format = Format {
     name: "UTIA",
     endings: &["bin"],
@@ -26,7 +27,7 @@ pub(super) static FORMAT: Format = Format {
     content: Content::Foreign(ForeignFormat {
         name: "UTIA .bin",
         content: ForeignContent::Brdf {
-            scale: Scale::Relative,
+            scale: None,
             read: |path| Ok(Box::new(read_utia(path)?)),
         },
     }),
@@ -35,25 +36,22 @@ pub(super) static FORMAT: Format = Format {
 /// A material of the database, linear between its nodes; beyond 75° it keeps the last ring's value.
 struct Utia {
     values: Vec<f64>,
+    /// Values below 0.
+    negative: u64,
+    /// Evaluations with a channel that came out below 0.
+    clipped: AtomicU64,
 }
 
 fn read_utia(path: &Path) -> Result<Utia, FileError> {
-    let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
+    let remedy = "a UTIA .bin of 15° and 7.5° steps holds 1,990,656 bytes (or 995,328)";
+    let bytes = read_of_length(path, &[8 * COUNT, 4 * COUNT], remedy)?;
     let values: Vec<f64> = if bytes.len() == 8 * COUNT {
         let (words, _) = bytes.as_chunks::<8>();
         words.iter().map(|w| f64::from_le_bytes(*w)).collect()
-    } else if bytes.len() == 4 * COUNT {
-        let (words, _) = bytes.as_chunks::<4>();
-        words
-            .iter()
-            .map(|w| f64::from(f32::from_le_bytes(*w)))
-            .collect()
     } else {
-        return Err(FileError::new(
-            path,
-            format_args!("holds {} bytes", bytes.len()),
-            "a UTIA .bin of 15° and 7.5° steps holds 1,990,656 bytes (or 995,328)",
-        ));
+        let (words, _) = bytes.as_chunks::<4>();
+        let value = |w: &[u8; 4]| f64::from(f32::from_le_bytes(*w));
+        words.iter().map(value).collect()
     };
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(FileError::new(
@@ -62,7 +60,18 @@ fn read_utia(path: &Path) -> Result<Utia, FileError> {
             "copy the file again",
         ));
     }
-    Ok(Utia { values })
+    if values.iter().all(|value| *value <= 0.0) {
+        return Err(FileError::new(
+            path,
+            "holds no value above 0",
+            "check that it is a UTIA .bin (little-endian)",
+        ));
+    }
+    Ok(Utia {
+        negative: values.iter().filter(|value| **value < 0.0).count() as u64,
+        values,
+        clipped: AtomicU64::new(0),
+    })
 }
 
 /// The four nodes around a direction, with their weights.
@@ -91,7 +100,25 @@ impl Brdf for Utia {
                 }
             }
         }
+        if sum.iter().any(|v| *v < 0.0) {
+            self.clipped.fetch_add(1, Ordering::Relaxed);
+        }
         sum.map(|v| v.max(0.0))
+    }
+}
+
+impl ForeignBrdf for Utia {
+    fn last_deg(&self) -> f64 {
+        (N_THETA - 1) as f64 * THETA_STEP_DEG
+    }
+
+    fn gaps(&self) -> Option<Gaps> {
+        (self.negative > 0).then(|| Gaps {
+            missing: self.negative,
+            of: COUNT as u64,
+            instead: "negative; 0 where the interpolated value is below it",
+            evaluations: self.clipped.load(Ordering::Relaxed),
+        })
     }
 }
 
@@ -121,6 +148,27 @@ mod tests {
         }
         std::fs::write(&path, "short").unwrap();
         assert!(read_utia(&path).unwrap_err_text().contains("holds 5 bytes"));
+        std::fs::write(&path, vec![0; 4 * COUNT]).unwrap();
+        assert!(
+            read_utia(&path)
+                .unwrap_err_text()
+                .contains("no value above 0")
+        );
+    }
+
+    #[test]
+    fn negative_values_are_counted() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.bin");
+        let at = |t, p| Direction::from_deg(t, p).to_vec3();
+        let value = |k: usize| if k == 0 { -1.0f32 } else { 0.5 };
+        let bytes: Vec<u8> = (0..COUNT).flat_map(|k| value(k).to_le_bytes()).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        let utia = read_utia(&path).unwrap();
+        assert_eq!(utia.eval(at(0.0, 0.0), at(0.0, 0.0)), [0.0, 0.5, 0.5]);
+        utia.eval(at(30.0, 0.0), at(0.0, 0.0));
+        let gaps = utia.gaps().unwrap();
+        assert_eq!((gaps.missing, gaps.evaluations), (1, 1));
     }
 
     trait ErrorText {

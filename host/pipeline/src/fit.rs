@@ -6,10 +6,11 @@ use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
 use gonia_brdf::Elementary;
 use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
-use gonia_brdf::{Bins, DenseBrdf, Sample};
+use gonia_brdf::{Bins, DenseBrdf, Direction, Sample};
+use gonia_formats::checksum;
 use gonia_formats::dense::write_dense;
 use gonia_formats::fit_toml::FitNote;
-use gonia_rig::{DenseFile, Figures, Scale};
+use gonia_rig::{DenseFile, Figures, Remark, Scale};
 use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
@@ -45,6 +46,41 @@ pub fn cells_of_samples(
     Ok(cells)
 }
 
+/// Levels of samples and of the dense BRDF behind which they are may differ by this factor: interpolation
+/// smooths highlights, and noise does not move a median.
+const LEVEL_MAX: f64 = 1.25;
+/// Beyond this polar angle a table is mostly extrapolated, degrees.
+const LEVEL_THETA_MAX_DEG: f64 = 75.0;
+
+/// What speaks against measured cells being those behind a dense BRDF: another level.
+pub fn level_remark(dense: &DenseBrdf, cells: &[Cell], samples: &Path) -> Option<Remark> {
+    let mut logs: Vec<f64> = cells
+        .iter()
+        .filter_map(|cell| {
+            let [light, view] = [cell.light, cell.view].map(Direction::from_vec3);
+            let is_near = |d: Direction| d.theta_deg() <= LEVEL_THETA_MAX_DEG;
+            let ratio = cell.value[1] / f64::from(dense.lookup(light, view)[1]);
+            (is_near(light) && is_near(view) && ratio > 0.0 && ratio.is_finite())
+                .then(|| ratio.ln())
+        })
+        .collect();
+    let middle = logs.len() / 2;
+    if logs.is_empty() {
+        return None;
+    }
+    let (_, median, _) = logs.select_nth_unstable_by(middle, f64::total_cmp);
+    (median.abs() > LEVEL_MAX.ln()).then(|| {
+        Remark::new(
+            samples.display(),
+            format_args!(
+                "its values are {:.3} times those of the dense BRDF (median): they are not of one measurement or not of one scale",
+                median.exp()
+            ),
+            "give the samples that it was filled from",
+        )
+    })
+}
+
 /// Fits a model, one of gonia's or of your own, to cells, tabulates it on the grid of `measured` and compares it with that. `name` is
 /// what the figures call `measured`.
 ///
@@ -72,7 +108,8 @@ pub fn fit_model<F: ModelFamily + Display>(
     let figures = step(progress, Step::Comparing, |_| {
         against(&dense, &model_name, measured, name)
     })?;
-    let note = FitNote::new(&fit, seconds, figures);
+    let mut note = FitNote::new(&fit, seconds, figures);
+    note.dense = Some(checksum::of_brdf(&measured.brdf));
     Ok(FitResult { note, dense })
 }
 

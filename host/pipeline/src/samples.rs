@@ -2,10 +2,12 @@
 
 use crate::Error;
 use crate::process::{
-    FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, Sampled, process,
-    process_sampled,
+    FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, ReferenceCalibration,
+    Sampled, process, process_sampled,
 };
 use crate::progress::{Progress, Step, step};
+use crate::provenance::{Provenance, of_this_program};
+use gonia_formats::samples::SampleNote;
 use gonia_formats::{CaptureFolder, FrameCounts, Refused};
 use gonia_rig::{FrameRow, Rig, Role, SampleSet, Scale};
 use std::collections::BTreeMap;
@@ -101,6 +103,23 @@ impl Processed {
             Scale::Absolute
         } else {
             Scale::Relative
+        }
+    }
+
+    /// What a file of the samples says of them: their scale, how they were calibrated, this program, and
+    /// `facts` of the caller's.
+    pub fn note(&self, facts: Provenance) -> SampleNote {
+        let calibration = match self.calibration {
+            ReferenceCalibration::KnownReference => "against the known reference",
+            ReferenceCalibration::UnknownReference => "against the unknown reference, eq. (3)",
+            ReferenceCalibration::GeometricModel => "ideal light over the geometry",
+        };
+        let mut provenance = of_this_program();
+        provenance.insert("calibration".to_owned(), calibration.to_owned());
+        provenance.extend(facts);
+        SampleNote {
+            scale: Some(self.scale()),
+            provenance,
         }
     }
 

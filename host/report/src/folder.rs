@@ -1,72 +1,88 @@
 //! The report of a folder that a run left behind.
 
 use crate::figures::write_figures;
-use crate::files::{DENSE, ERRORS, MEASURED, REPORT, RIG, RIVALS, SUMMARY, TRUTH};
+use crate::files::{DENSE, ERRORS, MEASURED, REPORT, RIG, RIVALS, RIVALS_FIGURE, SUMMARY, TRUTH};
 use crate::html::write_report;
 use crate::input::ReportInput;
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::cell_mask::read_mask;
-use gonia_formats::dense::read_dense;
+use gonia_formats::dense::{ERRORS_OF, read_dense};
 use gonia_formats::fit_toml::FitNote;
 use gonia_formats::rig_toml::read_rig;
-use gonia_formats::{FileError, Summary};
+use gonia_formats::{FileError, Summary, checksum};
+use gonia_pipeline::{Options, Side, Table, compare};
 use gonia_render::Tabulated;
+use gonia_rig::{DenseFile, Remark};
 use std::path::{Path, PathBuf};
 
-/// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there
-/// `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
+/// What became of a folder's report.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// The paths of what was written, the report first.
+    pub written: Vec<PathBuf>,
+    /// What is in the folder and is not shown, because it was said of another dense BRDF.
+    pub remarks: Vec<Remark>,
+}
+
+/// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there and of that
+/// dense BRDF `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
 /// (`*.fit.toml`) and charts (`*.svg`); and the paper's figures into a second folder, if one is given.
-/// Returns the paths of what it wrote, the report first.
 ///
 /// # Errors
 /// One line naming the file: no dense BRDF, a file that cannot be used, a truth of another grid, or
 /// the report cannot be written.
-pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Vec<PathBuf>, FileError> {
+pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, FileError> {
     let file = read_dense(&folder.join(DENSE))?;
-    let summary_path = folder.join(SUMMARY);
-    let summary = if summary_path.exists() {
-        Summary::read(&summary_path)?
-    } else {
-        let name = folder.canonicalize().ok();
-        let name = name
-            .as_deref()
-            .and_then(Path::file_name)
-            .map(|name| name.to_string_lossy());
-        let mut summary = Summary::new(name.unwrap_or("A BRDF".into()), file.scale);
-        summary.provenance = file.provenance;
-        summary
-    };
-    let measured_path = folder.join(MEASURED);
-    let measured = match measured_path.exists() {
-        true => Some(read_mask(&measured_path, file.brdf.grid())?),
-        false => None,
-    };
     let grid = file.brdf.grid();
+    let mut owner = Owner::of(&file.brdf);
+    let rig = optional(&folder.join(RIG), read_rig)?;
     let truth = table_beside(folder, TRUTH, grid)?;
     let errors = table_beside(folder, ERRORS, grid)?;
-    let rig_path = folder.join(RIG);
-    let rig = match rig_path.exists() {
-        true => Some(read_rig(&rig_path)?),
-        false => None,
-    };
-    let baselines_path = folder.join(RIVALS);
-    let baselines = match baselines_path.exists() {
-        true => Some(BaselineTable::read(&baselines_path)?),
-        false => None,
-    };
-    let fits = FitNote::read_all(folder)?;
-    let charts = charts_of(folder);
-    let truth = truth.as_ref().map(Tabulated::new);
+    let errors = errors.filter(|errors| {
+        let of = errors.provenance.get(ERRORS_OF);
+        owner.keeps(&folder.join(ERRORS), of, "gonia fill --error")
+    });
+    let baselines = optional(&folder.join(RIVALS), BaselineTable::read)?;
+    let baselines = baselines
+        .filter(|table| owner.keeps(&folder.join(RIVALS), table.dense.as_ref(), "gonia rivals"));
+    let mut fits = Vec::new();
+    for (path, fit) in FitNote::read_all(folder)? {
+        if owner.keeps(&path, fit.dense.as_ref(), "gonia fit") {
+            fits.push(fit);
+        }
+    }
+    let mut charts = charts_of(folder);
+    charts.retain(|(name, _)| name != RIVALS_FIGURE || baselines.is_some());
+    let mask = optional(&folder.join(MEASURED), |path| read_mask(path, grid))?;
+    let read = optional(&folder.join(SUMMARY), Summary::read)?;
+    let (mut summary, is_its_own) = summary_of(folder, read, &file, &mut owner);
+    let measured = mask.filter(|mask| {
+        let counted = summary.bins.as_ref().map(|bins| bins.filled);
+        is_its_own && counted.is_none_or(|filled| filled == mask.count() as u64)
+            || owner.drops(&folder.join(MEASURED), "gonia demo")
+    });
+    if let (None, Some(truth)) = (&summary.figures, &truth) {
+        let anew = compare(
+            Table::from(&file),
+            Side::Table(Table::from(truth)),
+            &Options::default(),
+        );
+        summary.figures = anew
+            .map_err(|error| owner.say(&folder.join(TRUTH), error))
+            .ok();
+    }
+    let truth = truth.as_ref().map(|truth| Tabulated::new(&truth.brdf));
     let report = folder.join(REPORT);
     let input = ReportInput {
         truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
         measured: measured.as_ref(),
-        errors: errors.as_ref(),
+        errors: errors.as_ref().map(|errors| &errors.brdf),
         rig: rig.as_ref(),
         fits: &fits,
         baselines: baselines.as_ref(),
         charts: &charts,
+        remarks: &owner.remarks,
         ..ReportInput::new(&summary, &file.brdf)
     };
     write_report(&report, &input)?;
@@ -74,24 +90,126 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Vec<PathBu
     if let Some(figures) = figures {
         written.extend(write_figures(figures, &input)?);
     }
-    Ok(written)
+    Ok(Drawn {
+        written,
+        remarks: owner.remarks,
+    })
+}
+
+/// The summary of a folder as far as it is one of its dense BRDF, and whether it is.
+fn summary_of(
+    folder: &Path,
+    read: Option<Summary>,
+    file: &DenseFile,
+    owner: &mut Owner,
+) -> (Summary, bool) {
+    let path = folder.join(SUMMARY);
+    let is_other = |summary: &Summary| {
+        summary.scale != file.scale
+            || summary
+                .dense
+                .as_ref()
+                .is_some_and(|of| *of != owner.checksum)
+    };
+    match read {
+        Some(summary) if is_other(&summary) => {
+            owner.drops(&path, "gonia demo");
+        }
+        Some(mut summary) => {
+            // An older summary does not say of which values its figures are.
+            let says_nothing =
+                summary.figures.is_none() && summary.bins.is_none() && summary.cells.is_none();
+            if summary.dense.is_none() && !says_nothing {
+                owner.keeps(&path, None, "gonia demo");
+                summary.figures = None;
+                summary.bins = None;
+                summary.cells = None;
+            }
+            return (summary, true);
+        }
+        None => {}
+    }
+    let is_alone = !path.exists();
+    let name = folder.canonicalize().ok();
+    let name = name
+        .as_deref()
+        .and_then(Path::file_name)
+        .map(|name| name.to_string_lossy());
+    let mut summary = Summary::new(name.unwrap_or("A BRDF".into()), file.scale);
+    summary.provenance.clone_from(&file.provenance);
+    (summary, is_alone)
+}
+
+/// The dense BRDF that files beside it must have been made of.
+struct Owner {
+    checksum: String,
+    remarks: Vec<Remark>,
+}
+
+impl Owner {
+    fn of(brdf: &DenseBrdf) -> Self {
+        Self {
+            checksum: checksum::of_brdf(brdf),
+            remarks: Vec::new(),
+        }
+    }
+
+    /// Whether a file was made of this dense BRDF; if not, that is said.
+    fn keeps(&mut self, path: &Path, of: Option<&String>, remedy: &str) -> bool {
+        match of {
+            Some(of) if *of == self.checksum => true,
+            Some(_) => self.drops(path, remedy),
+            None => {
+                self.remarks.push(Remark::new(
+                    path.display(),
+                    format_args!("does not say of which {DENSE} it is, and is not shown"),
+                    format_args!("make it again ({remedy})"),
+                ));
+                false
+            }
+        }
+    }
+
+    /// Says that a file is another dense BRDF's. Always `false`.
+    fn drops(&mut self, path: &Path, remedy: &str) -> bool {
+        self.remarks.push(Remark::new(
+            path.display(),
+            format_args!("was made of another {DENSE}, and is not shown"),
+            format_args!("make it again ({remedy}), or restore the one that it was made of"),
+        ));
+        false
+    }
+
+    fn say(&mut self, path: &Path, error: impl std::fmt::Display) {
+        let what = format!("cannot be compared with {DENSE} ({error})");
+        self.remarks.push(Remark::new(
+            path.display(),
+            what,
+            "check that it is the truth",
+        ));
+    }
+}
+
+/// What is in a file, where it is there.
+fn optional<T>(
+    path: &Path,
+    read: impl FnOnce(&Path) -> Result<T, FileError>,
+) -> Result<Option<T>, FileError> {
+    path.exists().then(|| read(path)).transpose()
 }
 
 /// A table beside the dense BRDF, of the same grid; `None` where it is not there.
-fn table_beside(folder: &Path, name: &str, grid: Grid) -> Result<Option<DenseBrdf>, FileError> {
+fn table_beside(folder: &Path, name: &str, grid: Grid) -> Result<Option<DenseFile>, FileError> {
     let path = folder.join(name);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let brdf = read_dense(&path)?.brdf;
-    if brdf.grid() != grid {
+    let file = optional(&path, read_dense)?;
+    if file.as_ref().is_some_and(|file| file.brdf.grid() != grid) {
         return Err(FileError::new(
             &path,
             format_args!("is of another grid than {DENSE}"),
             "remove it, or make it again with the same steps",
         ));
     }
-    Ok(Some(brdf))
+    Ok(file)
 }
 
 /// The charts of a folder, by name.
@@ -115,7 +233,7 @@ mod tests {
     use super::*;
     use gonia_formats::cell_mask::write_mask;
     use gonia_formats::dense::write_dense;
-    use gonia_rig::{CellMask, DenseFile, Scale};
+    use gonia_rig::{CellMask, Scale};
 
     fn flat(step_deg: f64, value: f32) -> DenseFile {
         let grid = Grid::with_step_deg(step_deg).unwrap();
@@ -138,7 +256,7 @@ mod tests {
 
         write_dense(&dir.path().join(DENSE), flat(30.0, 0.3)).unwrap();
         let report = report_folder(dir.path(), None).unwrap();
-        let text = std::fs::read_to_string(&report[0]).unwrap();
+        let text = std::fs::read_to_string(&report.written[0]).unwrap();
         assert!(text.contains("values in 1/sr") && text.contains("seed"));
         assert!(!text.contains("Measured against true"));
     }
@@ -154,7 +272,9 @@ mod tests {
         Summary::new("silk", Scale::Absolute)
             .write(&dir.path().join(SUMMARY))
             .unwrap();
-        let text = std::fs::read_to_string(&report_folder(dir.path(), None).unwrap()[0]).unwrap();
+        let drawn = report_folder(dir.path(), None).unwrap();
+        assert_eq!(drawn.remarks, []);
+        let text = std::fs::read_to_string(&drawn.written[0]).unwrap();
         assert!(text.contains("<h1>silk</h1>") && text.contains("Measured against true"));
         assert!(text.contains("Measured bins"));
 

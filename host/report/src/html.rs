@@ -8,7 +8,7 @@ use crate::{baselines, charts, explorer, fits, panels, shots, slices, spans, sub
 use gonia_brdf::{Brdf, Grid};
 use gonia_formats::{FileError, FrameCounts, Pointing, Summary, write_whole_bytes};
 use gonia_render::svg::STYLE;
-use gonia_rig::{Figures, Scale};
+use gonia_rig::{Figures, Remark, Scale};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 
@@ -40,6 +40,7 @@ fn page(input: &ReportInput<'_>) -> Markup {
                 main {
                     (heading(summary, grid))
                     (cards(summary, grid))
+                    (left_out(input.remarks))
                     (provenance(summary))
                     (renders(input))
                     (explorer::section(input.dense, unit_of(summary)))
@@ -132,6 +133,16 @@ fn pointing_card(pointing: &Pointing) -> Markup {
     card(&format!("{:.4}", pointing.max_deg), "°", &what)
 }
 
+/// What is beside the data and is not shown.
+fn left_out(remarks: &[Remark]) -> Markup {
+    html! {
+        @if !remarks.is_empty() {
+            h2 { "Left out" }
+            ul { @for remark in remarks { li { (remark.to_string()) } } }
+        }
+    }
+}
+
 fn provenance(summary: &Summary) -> Markup {
     if summary.provenance.is_empty() {
         return html! {};
@@ -171,6 +182,8 @@ fn renders(input: &ReportInput<'_>) -> Markup {
     } else {
         "shots alone"
     };
+    let grid = input.dense.grid();
+    let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
     let picture = |uri: &str, name: &str, what: &str| {
         html! {
             figure {
@@ -184,6 +197,7 @@ fn renders(input: &ReportInput<'_>) -> Markup {
         p.soft {
             "Lit by a key light from the upper left, a fill from the right, a rim from behind and a dim dome. \
              The material's x axis runs to the right, its y axis up; sphere and cloth cast no shadows. "
+            "Beyond " (last_deg) "°, where the grid ends, they show the values of its last polar angle. "
             @if input.truth.is_some() {
                 "Measured and true share one exposure; their difference is ΔE00 of what the screen shows."
             }

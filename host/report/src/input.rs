@@ -4,7 +4,7 @@ use gonia_brdf::{Brdf, DenseBrdf};
 use gonia_formats::Summary;
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::fit_toml::FitNote;
-use gonia_rig::{CellMask, Rig};
+use gonia_rig::{CellMask, Remark, Rig};
 
 /// What a report is drawn from.
 #[derive(Clone, Copy)]
@@ -27,6 +27,8 @@ pub struct ReportInput<'a> {
     pub baselines: Option<&'a BaselineTable>,
     /// Charts that stand beside the data: name and SVG.
     pub charts: &'a [(String, String)],
+    /// What is beside the data and is not shown, and why.
+    pub remarks: &'a [Remark],
 }
 
 impl<'a> ReportInput<'a> {
@@ -42,6 +44,7 @@ impl<'a> ReportInput<'a> {
             fits: &[],
             baselines: None,
             charts: &[],
+            remarks: &[],
         }
     }
 }

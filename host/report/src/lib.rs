@@ -28,7 +28,7 @@ mod spans;
 mod subspaces;
 
 pub use figures::{write_figures, write_sphere};
-pub use folder::report_folder;
+pub use folder::{Drawn, report_folder};
 pub use html::write_report;
 pub use input::ReportInput;
 pub use make_baselines::make_baselines;

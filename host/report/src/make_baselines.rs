@@ -4,7 +4,7 @@ use crate::baselines::{BaselinePictures, draw_baseline, figure};
 use crate::files::{DENSE, RIVALS, RIVALS_FIGURE, TRUTH};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::dense::{read_dense, write_dense};
-use gonia_formats::samples::read_samples;
+use gonia_formats::samples::{check_scale, read_samples};
 use gonia_formats::write_whole_bytes;
 use gonia_pipeline::baselines::{BaselineOptions, Made, Measurement};
 use gonia_pipeline::fit::write_fit;
@@ -27,13 +27,14 @@ pub fn make_baselines(
     progress: &Progress<'_>,
 ) -> Result<BaselineTable, Error> {
     let path = |name: &str| folder.join(name);
-    let samples = read_samples(&path(SAMPLES))?.samples;
+    let read = read_samples(&path(SAMPLES))?;
     let dense = read_dense(&path(DENSE))?;
+    check_scale(&path(SAMPLES), read.scale, dense.scale)?;
     let truth = match path(TRUTH).exists() {
         true => Some(read_dense(&path(TRUTH))?),
         false => None,
     };
-    let measurement = Measurement::new(dense, truth, samples, step_deg)?;
+    let measurement = Measurement::new(dense, truth, read.samples, step_deg)?;
     let mut rows: Vec<BaselinePictures> = vec![draw_baseline("dense", measurement.dense())];
     let comparison = measurement.baselines(
         options,

@@ -2,7 +2,9 @@
 
 use crate::bench_setup::check_bench;
 use crate::rig_error::within;
-use crate::{CameraGeometry, LightGeometry, Reference, Rig, RigError, Sampling, Sensor, Target};
+use crate::{
+    CameraGeometry, LightGeometry, Reference, Remark, Rig, RigError, Sampling, Sensor, Target,
+};
 
 /// Checks that a rig could exist, whoever made it.
 ///
@@ -14,7 +16,7 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     check_target(&rig.target)?;
     if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
         for rho in *reflectance {
-            within("reference.reflectance", rho, f64::MIN_POSITIVE..=1.0, "")?;
+            check_reflectance(rho)?;
         }
     }
     if let Some(sensor) = &rig.sensor {
@@ -27,6 +29,41 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         rig.session.as_ref(),
         rig.sensor.as_ref(),
     )
+}
+
+/// Most that a reference reflects of the light, a channel: real tiles, whose factor is against an ideal
+/// diffuser, come out a little above 1 in one.
+const REFLECTANCE_MAX: f64 = 1.1;
+
+fn check_reflectance(rho: f64) -> Result<(), RigError> {
+    let key = "reference.reflectance";
+    // White standards reflect more than half: their percentages are not mistaken for anything else.
+    if (50.0..=100.0 * REFLECTANCE_MAX).contains(&rho) {
+        let problem = format!("{rho} is not possible: it may be a percentage");
+        return Err(RigError::new(key, problem, "give a share: 99 % is 0.99"));
+    }
+    within(key, rho, f64::MIN_POSITIVE..=REFLECTANCE_MAX, "")
+}
+
+/// What is to be said of a rig that was read from `file` and may be used all the same.
+pub fn rig_remarks(file: impl std::fmt::Display, rig: &Rig) -> Vec<Remark> {
+    let Some(Reference::Reflectance(reflectance)) = &rig.reference else {
+        return Vec::new();
+    };
+    let above = reflectance.iter().copied().filter(|rho| *rho > 1.0);
+    above
+        .reduce(f64::max)
+        .map(|most| {
+            Remark::new(
+                format_args!("{file}, key reference.reflectance"),
+                format_args!(
+                    "{most} is more than an ideal diffuser reflects, and is used as it is"
+                ),
+                "check it against the reference's certificate",
+            )
+        })
+        .into_iter()
+        .collect()
 }
 
 fn check_camera(camera: &CameraGeometry) -> Result<(), RigError> {
@@ -175,4 +212,40 @@ fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
         ),
         remedy: "give the counts of a frame without light, and those the sensor ends at".into(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rig_of(reflectance: [f64; 3]) -> Rig {
+        Rig {
+            reference: Some(Reference::Reflectance(reflectance)),
+            ..Rig::paper(400)
+        }
+    }
+
+    #[test]
+    fn a_reflectance_a_little_above_one_is_used_and_said() {
+        for (reflectance, remarks) in [([0.99; 3], 0), ([1.0; 3], 0), ([0.99, 1.02, 1.1], 1)] {
+            let rig = rig_of(reflectance);
+            assert_eq!(check_rig(&rig), Ok(()));
+            assert_eq!(rig_remarks("rig.toml", &rig).len(), remarks);
+        }
+        let said = rig_remarks("rig.toml", &rig_of([0.99, 1.02, 1.0]))[0].to_string();
+        assert!(
+            said.starts_with("rig.toml, key reference.reflectance: 1.02 is more"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_reflectance_is_refused_and_a_percentage_is_called_one() {
+        for wrong in [0.0, -0.5, 1.11, 30.0, f64::NAN] {
+            let error = check_rig(&rig_of([0.9, 0.9, wrong])).unwrap_err();
+            assert!(error.remedy.contains("at most 1.1"), "{error}");
+        }
+        let error = check_rig(&rig_of([98.5, 99.0, 99.0])).unwrap_err();
+        assert!(error.problem.contains("percentage"), "{error}");
+    }
 }

@@ -33,7 +33,7 @@ pub mod stratum;
 pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
-pub use check::check_rig;
+pub use check::{check_rig, rig_remarks};
 pub use dense::DenseFile;
 pub use figures::{Figures, StratumFigures};
 pub use frame::Frame;

@@ -80,7 +80,7 @@ pub struct Target {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
 pub enum Reference {
-    /// A Lambertian one: albedo per channel, 0 < ρ ≤ 1.
+    /// A Lambertian one: reflectance factor per channel, 0 < ρ ≤ 1.1.
     Reflectance([f64; 3]),
     /// One whose reflectance depends on direction.
     Table {

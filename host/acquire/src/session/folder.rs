@@ -5,9 +5,9 @@ use crate::session::journal::Lines;
 use crate::session::provenance::SessionProvenance;
 use crate::session::{journal, record};
 use gonia_brdf::Pose;
-use gonia_formats::FileError;
 use gonia_formats::plan_csv::read_plan_csv;
 use gonia_formats::rig_toml::read_rig;
+use gonia_formats::{FileError, checksum};
 use gonia_pipeline::process::SampledFrame;
 use gonia_protocol::crc32c;
 use gonia_rig::{FrameRow, Rig, Role};
@@ -218,14 +218,8 @@ impl SessionFolder {
     }
 }
 
-/// Checksum of a file, as the provenance has it.
-pub(super) fn crc_of(path: &Path) -> Result<String, FileError> {
-    let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
-    Ok(format!("{:08x}", crc32c(&bytes)))
-}
-
 fn check_crc(path: &Path, expected: &str) -> Result<(), FileError> {
-    if crc_of(path)? == expected {
+    if checksum::of_file(path)? == expected {
         return Ok(());
     }
     Err(FileError::new(

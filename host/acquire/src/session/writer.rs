@@ -1,13 +1,13 @@
 //! A session's folder as it is written: by one program at a time.
 
 use crate::session::entry::{Entry, PoseDone};
-use crate::session::folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder, crc_of};
+use crate::session::folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 use crate::session::journal::Journal;
 use crate::session::provenance::SessionProvenance;
 use crate::session::{clock, record};
 use gonia_brdf::Pose;
 use gonia_formats::plan_csv::write_plan_csv;
-use gonia_formats::{FileError, check_writable, write_whole_bytes};
+use gonia_formats::{FileError, check_writable, checksum, write_whole_bytes};
 use gonia_pipeline::process::SampledFrame;
 use gonia_protocol::crc32c;
 use std::fs::{File, OpenOptions};
@@ -64,8 +64,8 @@ impl Claim {
         }
         write_plan_csv(&folder.join(PLAN), beginning.plan)?;
         let provenance = SessionProvenance {
-            rig_crc: crc_of(&folder.join(RIG))?,
-            plan_crc: crc_of(&folder.join(PLAN))?,
+            rig_crc: checksum::of_file(&folder.join(RIG))?,
+            plan_crc: checksum::of_file(&folder.join(PLAN))?,
             began: clock::now(),
             ..beginning.provenance.clone()
         };

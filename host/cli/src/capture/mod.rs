@@ -4,7 +4,8 @@ mod map;
 mod terminal;
 
 use crate::progress::Progress;
-use crate::{account, table};
+use crate::say::errln;
+use crate::{account, remarks, sample_facts, table};
 use anyhow::{Context, Result, bail};
 use gonia_acquire::capture::{
     ArmPortNames, Ended, Equipment, Orders, UnattendedSession, Watch, Watchers, free_mb, travelling,
@@ -17,12 +18,12 @@ use gonia_brdf::Pose;
 use gonia_formats::frames_csv::write_frames_csv;
 use gonia_formats::plan_csv::read_plan_csv;
 use gonia_formats::rig_toml::read_rig;
-use gonia_formats::samples::write_samples;
+use gonia_formats::samples::write_noted_samples;
 use gonia_formats::{FileError, check_writable};
 use gonia_live::{Listening, LivePage};
 use gonia_pipeline::process::MASKS;
 use gonia_plan::Rings;
-use gonia_rig::{Reference, Rig};
+use gonia_rig::{Reference, Rig, rig_remarks};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use terminal::Terminal;
@@ -74,6 +75,7 @@ impl Capture {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let rig = read_rig(&self.rig)?;
+        remarks::print(&rig_remarks(self.rig.display(), &rig));
         let rig_text =
             std::fs::read(&self.rig).map_err(|error| FileError::reading(&self.rig, &error))?;
         let beside = beside(&self.rig, &rig)?;
@@ -98,7 +100,7 @@ impl Capture {
         let mut equipment =
             Equipment::open(&rig, &self.rig, ports, plan.len(), &settings, &orders)?;
         if let Some(warning) = equipment.arms.calibration_warning()? {
-            eprintln!("warning: {warning}");
+            errln!("warning: {warning}");
         }
         equipment.check_reach(&plan)?;
         let provenance = provenance_of(&mut equipment, settings.reference);
@@ -203,7 +205,8 @@ impl Capture {
         let processed = session
             .samples(&progress.watch())
             .context("the session is complete, but gives no samples yet")?;
-        write_samples(&self.folder.join("samples.npy"), &processed.samples)?;
+        let note = processed.note(sample_facts::of_session("gonia capture", &session));
+        write_noted_samples(&self.folder.join("samples.npy"), &processed.samples, &note)?;
         if !processed.masks.is_empty() {
             let path = self.folder.join(MASKS);
             processed.masks.write(&path, session.rig())?;
@@ -231,8 +234,8 @@ fn provenance_of(equipment: &mut Equipment, reference: bool) -> SessionProvenanc
 /// Where the live page is. What is behind the # no browser sends on.
 fn say_where(live: &LivePage) {
     let (address, token) = (live.address(), live.token());
-    eprintln!("live page: http://{address}/#token={token}");
-    eprintln!("without the token the page only shows: http://{address}/");
+    errln!("live page: http://{address}/#token={token}");
+    errln!("without the token the page only shows: http://{address}/");
 }
 
 /// The file that a rig names, beside it.
@@ -271,9 +274,12 @@ fn check_equipment(began: &SessionProvenance, now: &SessionProvenance) -> Result
             );
         }
         if (&began.board, &began.firmware) != (&now.board, &now.firmware) {
-            eprintln!(
+            errln!(
                 "warning: {name}: the session began with {} {}, and goes on with {} {}",
-                began.board, began.firmware, now.board, now.firmware
+                began.board,
+                began.firmware,
+                now.board,
+                now.firmware
             );
         }
     }

@@ -1,6 +1,7 @@
 //! A session on the terminal: a map and a bar on one, plain lines elsewhere.
 
 use crate::capture::map::{Mark, PoseMap};
+use crate::say::errln;
 use crate::table;
 use gonia_acquire::capture::{Pace, SessionEvent, Watch};
 use gonia_acquire::session::SessionFolder;
@@ -91,7 +92,7 @@ impl Terminal {
 
     fn line(&self, text: &str) {
         if self.plain {
-            eprintln!("{text}");
+            errln!("{text}");
         } else {
             self.bar.println(text);
         }
@@ -117,7 +118,7 @@ impl Terminal {
         if written.is_ok() && !state.has_picture {
             state.has_picture = true;
             if self.plain {
-                eprintln!("last frame: {}", self.last_frame.display());
+                errln!("last frame: {}", self.last_frame.display());
             }
         }
     }
@@ -197,7 +198,7 @@ impl Watch for Terminal {
                 state.worst_deg = state.worst_deg.max(done.pointing_deg);
                 if self.plain && state.printed.elapsed() >= LINE_EVERY {
                     state.printed = Instant::now();
-                    eprintln!(
+                    errln!(
                         "{}: {} of {} poses, {}",
                         state.role.name(),
                         state.pace.done,

@@ -15,10 +15,10 @@ use gonia_formats::dense::write_dense;
 use gonia_formats::frames_csv::write_frames_csv;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::write_rig;
-use gonia_formats::samples::write_samples;
-use gonia_formats::{Summary, cell_mask, check_writable};
+use gonia_formats::samples::write_noted_samples;
+use gonia_formats::{Summary, cell_mask, check_writable, checksum};
 use gonia_pipeline::process::{FrameSource, Masks, Processed};
-use gonia_pipeline::provenance::of_this_program;
+use gonia_pipeline::provenance::{Provenance, of_this_program};
 use gonia_pipeline::{FillOptions, Options, Side, Table, compare, fill, samples_of};
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
@@ -108,6 +108,19 @@ impl Run {
         self.demo.out.join(name)
     }
 
+    /// What was simulated.
+    fn facts(&self) -> Provenance {
+        Provenance::from([
+            ("material".to_owned(), self.material.name.to_owned()),
+            ("seed".into(), self.demo.seed.to_string()),
+            (
+                "rig".into(),
+                format!("simulated, frames of {} px", self.rig.camera.width_px),
+            ),
+            ("plan".into(), format!("{} poses", self.poses.len())),
+        ])
+    }
+
     /// Moves the arms through the plan, and makes samples of the frames.
     fn measure(&self) -> Result<(Session, Processed)> {
         write_rig(&self.path("rig.toml"), &self.rig)?;
@@ -130,8 +143,9 @@ impl Run {
         }
         let masks = Masks::default();
         let processed = samples_of(&self.rig, &camera, &masks, &self.progress.watch())?;
+        let note = processed.note(self.facts());
         self.progress.stage("writing samples", |_| {
-            write_samples(&self.path("samples.npy"), &processed.samples)
+            write_noted_samples(&self.path("samples.npy"), &processed.samples, &note)
         })?;
         Ok((session, processed))
     }
@@ -151,17 +165,7 @@ impl Run {
             &self.progress.watch(),
         )?;
         let mut file = filled.dense;
-        for (name, text) in [
-            ("material", self.material.name.to_owned()),
-            ("seed", self.demo.seed.to_string()),
-            (
-                "rig",
-                format!("simulated, frames of {} px", self.rig.camera.width_px),
-            ),
-            ("plan", format!("{} poses", self.poses.len())),
-        ] {
-            file.provenance.insert(name.into(), text);
-        }
+        file.provenance.extend(self.facts());
         summary.provenance = file.provenance.clone();
         let cells = filled.cells.iter().map(|cell| *cell as usize);
         let measured = CellMask::from_cells(file.brdf.grid(), cells);
@@ -170,6 +174,7 @@ impl Run {
         let dense = self.progress.stage("writing the dense BRDF", |_| {
             write_dense(&self.path(DENSE), file)
         })?;
+        summary.dense = Some(checksum::of_brdf(&dense.brdf));
         Ok((summary, dense, measured))
     }
 

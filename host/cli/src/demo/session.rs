@@ -1,6 +1,7 @@
 //! The session on the simulated rig: both arms through all poses, once over the reference and once
 //! over the material.
 
+use crate::say::errln;
 use anyhow::Result;
 use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
@@ -58,7 +59,7 @@ pub fn measure(
         Box::new(rig.port(Arm::Camera)),
     )?;
     if let Some(warning) = arms.calibration_warning()? {
-        eprintln!("warning: {warning}");
+        errln!("warning: {warning}");
     }
     let mut session = Session {
         kept: 0,

@@ -1,6 +1,7 @@
 //! What the demo did, in figures: for `summary.toml`, and as a table on the terminal.
 
 use crate::demo::session::Session;
+use crate::say::outln;
 use crate::table;
 use gonia_brdf::Grid;
 use gonia_formats::{BinCounts, CellCounts, FileNote, PoseCounts, Summary};
@@ -10,7 +11,7 @@ use gonia_rig::CellMask;
 use std::path::Path;
 
 /// What each file of a demo holds.
-const FILES: [(&str, &str); 10] = [
+const FILES: [(&str, &str); 11] = [
     (REPORT, "the report"),
     ("sphere.png", "the material on a sphere"),
     (DENSE, "the dense BRDF"),
@@ -19,6 +20,7 @@ const FILES: [(&str, &str); 10] = [
         "samples.npy",
         "samples: theta_i, phi_i, theta_v, phi_v, r, g, b, frame",
     ),
+    ("samples.npy.toml", "scale and provenance of these samples"),
     (MEASURED, "one bit a cell: which ones hold a sample"),
     ("plan.csv", "the poses in travelling order"),
     ("rig.toml", "the rig"),
@@ -169,6 +171,6 @@ pub fn print(summary: &Summary, session: &Session, frame_rows: &[(String, String
     }
     table::print(&rows);
     if let Some(figures) = &summary.figures {
-        println!("\n{figures}");
+        outln!("\n{figures}");
     }
 }

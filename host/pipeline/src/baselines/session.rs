@@ -11,6 +11,7 @@ use gonia_brdf::baselines::BaselineSettings;
 use gonia_brdf::fit::{FitSettings, StandardFamily};
 use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use gonia_formats::baselines_toml::{BaselineRow, BaselineTable};
+use gonia_formats::checksum;
 use gonia_render::Tabulated;
 use gonia_rig::{DenseFile, Figures, SampleSet, Scale};
 use std::time::Instant;
@@ -18,6 +19,8 @@ use std::time::Instant;
 /// A measurement, and what its baselines are made with.
 pub struct Measurement {
     dense: DenseFile,
+    /// Checksum of its values as they were stored.
+    checksum: String,
     truth: Option<DenseFile>,
     samples: Vec<Sample>,
     /// Of the baselines, and of both tables here.
@@ -92,6 +95,7 @@ impl Measurement {
             return Err(Error::TooFewCentres { frames });
         }
         Ok(Self {
+            checksum: checksum::of_brdf(&dense.brdf),
             dense: thinned(dense),
             truth: truth.map(thinned),
             samples,
@@ -117,7 +121,10 @@ impl Measurement {
         take: &mut dyn FnMut(&BaselineRow, Made) -> Result<(), E>,
         progress: &Progress<'_>,
     ) -> Result<BaselineTable, E> {
-        let mut comparison = BaselineTable::default();
+        let mut comparison = BaselineTable {
+            dense: Some(self.checksum.clone()),
+            ..BaselineTable::default()
+        };
         let mut keep = |row: BaselineRow, made: Made| {
             take(&row, made)?;
             comparison.rows.push(row);
@@ -261,7 +268,9 @@ impl Measurement {
     ) -> Result<(BaselineRow, FitResult), Error> {
         let cells = cells_of_dense(&self.dense.brdf, settings);
         let family = family.for_values(self.dense.scale == Scale::Relative);
-        let result = fit_model(&self.dense, "dense.exr", &cells, family, settings, progress)?;
+        let mut result = fit_model(&self.dense, "dense.exr", &cells, family, settings, progress)?;
+        // A fit to a coarser grid is one to the stored BRDF all the same.
+        result.note.dense = Some(self.checksum.clone());
         let note = &result.note;
         let row = BaselineRow {
             name: note.model.clone(),
