@@ -104,10 +104,16 @@ impl From<Vec<Sample>> for SamplesRead {
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
-    pub read: fn(&Path) -> Result<SamplesRead, FileError>,
-    /// Writes a file whole.
-    pub write: fn(&Path, &[Sample]) -> Result<(), FileError>,
+    pub read: ReadSamples,
+    /// Writes a file whole. Absent where the format is only read.
+    pub write: Option<WriteSamples>,
 }
+
+/// See [`crate::samples::read_samples`].
+pub(crate) type ReadSamples = fn(&Path) -> Result<SamplesRead, FileError>;
+
+/// See [`crate::samples::write_samples`].
+pub(crate) type WriteSamples = fn(&Path, &[Sample]) -> Result<(), FileError>;
 
 /// A format of another group, which `gonia import` reads.
 pub struct ForeignFormat {

@@ -56,7 +56,11 @@ pub fn document(name: &str, cases: &[Case]) {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/reference/odd-input.md");
     let mut rows = String::from("| what came in | what gonia says | exit code |\n|---|---|---|\n");
     for case in cases {
-        let said = if case.said.is_empty() { "nothing: it is read" } else { &case.said };
+        let said = if case.said.is_empty() {
+            "nothing: it is read"
+        } else {
+            &case.said
+        };
         let _ = writeln!(rows, "| {} | {said} | {} |", case.came_in, case.code);
     }
     let (open, close) = (format!("<!-- {name} -->\n"), format!("<!-- /{name} -->"));
