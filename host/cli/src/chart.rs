@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
     after_long_help = "Example:\n  gonia chart samples.npy --truth truth.exr --out chart\n  gonia chart --motion --out chart\n\nWithout --truth the error is that at whole frames left out (with their reciprocal ones), which\nneeds samples with frame numbers, and holds the noise of the samples too.\n\nCosts are CPU seconds. Methods that work cell by cell are timed on the cells of the tests alone;\nthe share is in the CSV."
 )]
 pub struct Chart {
-    /// Samples, .npy or .csv
+    /// Samples, .npy, .npz or .csv
     #[arg(required_unless_present = "motion", conflicts_with = "motion")]
     samples: Option<PathBuf>,
     /// Chart the arms instead: session time against pointing error

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 /// Interpolates samples to every cell of the grid.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (float32, N x 7 or N x 8) or .csv with columns theta_i, phi_i, theta_v, phi_v\n(degrees), r, g, b and, if known, frame. Their scale is what a .csv says above its header\n(# scale = absolute), or the note beside a .npy (NAME.npy.toml, as gonia process writes it)."
+    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (N x 7, or N x 8 with the frame), .npz with one such array, or a table of text (.csv,\n.txt, .tsv) with columns theta_i, phi_i, theta_v, phi_v (degrees), r, g, b or one value (brdf) and,\nif known, frame. Other names, separators, types and orders: reference/files/samples of the book.\nTheir scale is what a table says above its header (# scale = absolute), or the note beside an array\n(NAME.npy.toml, as gonia process writes it)."
 )]
 pub struct Fill {
-    /// Samples, .npy or .csv; several files of one material count together
+    /// Samples, .npy, .npz or .csv; several files of one material count together
     #[arg(required = true)]
     samples: Vec<PathBuf>,
     /// The dense BRDF to write (OpenEXR)

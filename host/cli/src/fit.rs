@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 pub struct Fit {
     /// The dense BRDF
     dense: PathBuf,
-    /// The samples behind it, .npy or .csv: fit to what was measured, not to what was interpolated
+    /// The samples behind it, .npy, .npz or .csv: fit to what was measured, not to what was interpolated
     #[arg(long, value_name = "SAMPLES")]
     samples: Option<PathBuf>,
     /// Which model to fit

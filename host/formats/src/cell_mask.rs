@@ -26,12 +26,12 @@ pub fn read_mask(path: &Path, grid: Grid) -> Result<CellMask, FileError> {
     let mut array = npy::open(path, DTYPE, 1)?;
     let mut mask = CellMask::empty(grid);
     let expected = [grid.n_directions() as u64, CellMask::row_bytes(grid) as u64];
-    if array.shape != expected {
+    if array.header.shape != expected {
         return Err(FileError::new(
             path,
             format_args!(
                 "has the shape {}, not {}",
-                npy::shape_text(&array.shape),
+                npy::shape_text(&array.header.shape),
                 npy::shape_text(&expected)
             ),
             "use the mask and the dense BRDF of the same run",

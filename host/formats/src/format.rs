@@ -116,12 +116,16 @@ pub(crate) type WriteSamples = fn(&Path, &[Sample], Option<&SampleNote>) -> Resu
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
     /// Reads a file whole.
-    pub read: fn(&Path) -> Result<SamplesRead, FileError>,
-    /// Writes a file whole, with what is known of the samples where it can hold that.
-    pub write: WriteSamples,
-    /// Whether it can.
+    pub read: ReadSamples,
+    /// Writes a file whole, with what is known of the samples where it can hold that. Absent where the
+    /// format is only read.
+    pub write: Option<WriteSamples>,
+    /// Whether its files hold what is known of the samples.
     pub holds_notes: bool,
 }
+
+/// See [`crate::samples::read_samples`].
+pub(crate) type ReadSamples = fn(&Path) -> Result<SamplesRead, FileError>;
 
 /// A format of another group, which `gonia import` reads.
 pub struct ForeignFormat {

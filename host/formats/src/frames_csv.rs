@@ -3,7 +3,7 @@
 use crate::csv_table::CsvTable;
 use crate::{FileError, write_whole};
 use gonia_brdf::direction::angle_between;
-use gonia_brdf::{Direction, Pose};
+use gonia_brdf::{Direction, Pose, Sample};
 use gonia_rig::{Exposure, FrameRow, Role};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -46,7 +46,7 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
     let mut places = HashMap::new();
     while table.next_row()? {
         let row = FrameRow {
-            frame: table.number(frame)?,
+            frame: parse_frame(&table, frame)?,
             role: parse_role(&table, role)?,
             pose: Pose {
                 light: table.arm_direction(theta_i, phi_i)?,
@@ -111,6 +111,16 @@ fn exposure_of(
 fn is_same(a: Pose, b: Pose) -> bool {
     let apart = |a: Direction, b: Direction| angle_between(a.to_vec3(), b.to_vec3()).to_degrees();
     apart(a.light, b.light) <= SAME_POSE_DEG && apart(a.view, b.view) <= SAME_POSE_DEG
+}
+
+fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
+    match table.number(column)? {
+        Sample::NO_FRAME => Err(table.wrong(
+            format_args!("frame {} stands for none", Sample::NO_FRAME),
+            "number the frames from 0",
+        )),
+        frame => Ok(frame),
+    }
 }
 
 fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
@@ -309,6 +319,10 @@ mod tests {
             ),
             ("1,material,0,inf,0,0,a.exr", "phi_i_deg is inf"),
             ("-1,material,0,0,0,0,a.exr", "frame \"-1\""),
+            (
+                "4294967295,material,0,0,0,0,a.exr",
+                "frame 4294967295 stands for none",
+            ),
             ("1,dust,0,0,0,0,a.exr", "role \"dust\""),
             (
                 "1,material,0,0,0,0,/etc/a.exr",

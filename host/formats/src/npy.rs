@@ -1,8 +1,9 @@
-//! The header of `.npy` files: plain arrays of plain numbers, in C order.
+//! `.npy` files: what stands in front of the elements, and writing.
 //!
 //! Our own few lines rather than a crate's, because the header comes from outside: a length or a
 //! shape that is absurd must cost neither memory nor a panic.
 
+use crate::npy_literal::Literal;
 use crate::{FileError, write_whole};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
@@ -11,54 +12,116 @@ use std::path::Path;
 /// The longest header that is read; numpy's own are 118 bytes.
 const MAX_HEADER: usize = 1 << 16;
 
-/// An array whose header was read and whose rows come next.
-pub(super) struct NpyArray {
+/// What stands in front of an array's elements.
+pub(super) struct NpyHeader {
+    /// The type of its elements, as numpy describes it.
+    pub descr: Literal,
+    /// Whether the first index runs fastest.
+    pub fortran_order: bool,
     pub shape: Vec<u64>,
+    /// Its own bytes.
+    bytes: u64,
+}
+
+impl NpyHeader {
+    /// Reads it; an error of the kind `InvalidData` where there is none.
+    pub fn read(reader: &mut impl Read) -> io::Result<Self> {
+        let (text, bytes) = header_text(reader)?;
+        let parsed = || {
+            let header = Literal::parse(&text)?;
+            let Some(Literal::Truth(fortran_order)) = header.get("fortran_order") else {
+                return None;
+            };
+            let Some(Literal::Sequence(sides)) = header.get("shape") else {
+                return None;
+            };
+            let side = |side: &Literal| match side {
+                Literal::Number(side) => Some(*side),
+                _ => None,
+            };
+            Some(Self {
+                descr: header.get("descr")?.clone(),
+                fortran_order: *fortran_order,
+                shape: sides.iter().map(side).collect::<Option<_>>()?,
+                bytes,
+            })
+        };
+        parsed().ok_or_else(|| io::ErrorKind::InvalidData.into())
+    }
+
+    /// Whether a file of this length holds all elements that the header promises. Asked before any
+    /// memory is.
+    pub fn fits(&self, element_bytes: usize, file_len: u64) -> bool {
+        let promised = self
+            .shape
+            .iter()
+            .try_fold(element_bytes as u64, |bytes, side| bytes.checked_mul(*side))
+            .and_then(|bytes| bytes.checked_add(self.bytes));
+        promised.is_some_and(|bytes| bytes <= file_len)
+    }
+}
+
+/// An array whose header was read and whose elements come next.
+pub(super) struct NpyFile {
+    pub header: NpyHeader,
+    /// The length of the file.
+    pub len: u64,
     pub data: BufReader<File>,
 }
 
-/// Opens an array of a type (`<f4`), in C order, whose promised bytes are all there.
-pub(super) fn open(path: &Path, dtype: &str, element_bytes: u64) -> Result<NpyArray, FileError> {
-    let failed = |error: io::Error| FileError::reading(path, &error);
-    let file = File::open(path).map_err(failed)?;
-    let file_len = file.metadata().map_err(failed)?.len();
-    let mut data = BufReader::with_capacity(1 << 18, file);
-    let (header, header_len) = header_text(&mut data).map_err(|error| match error.kind() {
-        io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidData => not_npy(path),
-        _ => failed(error),
-    })?;
+impl NpyFile {
+    /// Opens an array of any type.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let failed = |error: io::Error| FileError::reading(path, &error);
+        let file = File::open(path).map_err(failed)?;
+        let len = file.metadata().map_err(failed)?.len();
+        let mut data = BufReader::with_capacity(1 << 18, file);
+        let header = NpyHeader::read(&mut data).map_err(|error| wrong_header(path, &error))?;
+        Ok(Self { header, len, data })
+    }
+}
 
-    let found = quoted(value_of(&header, "descr").ok_or_else(|| not_npy(path))?);
-    if found != dtype {
+/// Opens an array of a type (`|u1`), in C order, whose promised bytes are all there.
+pub(super) fn open(path: &Path, dtype: &str, element_bytes: usize) -> Result<NpyFile, FileError> {
+    let array = NpyFile::open(path)?;
+    let header = &array.header;
+    if header.descr != Literal::Text(dtype.to_owned()) {
         return Err(FileError::new(
             path,
-            format_args!("holds {found}, not {dtype}"),
+            format_args!("holds {}, not {dtype}", header.descr),
             format_args!("save it as numpy.dtype(\"{dtype}\")"),
         ));
     }
-    if !value_of(&header, "fortran_order").is_some_and(|value| value.starts_with("False")) {
+    if header.fortran_order {
         return Err(FileError::new(
             path,
             "is in Fortran order",
             "save numpy.ascontiguousarray of it",
         ));
     }
-    let shape = value_of(&header, "shape")
-        .and_then(tuple)
-        .ok_or_else(|| not_npy(path))?;
-    // Checked before anything is allocated.
-    let promised = shape
-        .iter()
-        .try_fold(element_bytes, |bytes, side| bytes.checked_mul(*side))
-        .and_then(|bytes| bytes.checked_add(header_len));
-    if promised.is_none_or(|bytes| bytes > file_len) {
-        return Err(FileError::new(
-            path,
-            format_args!("is cut short: its header promises {}", shape_text(&shape)),
-            "copy or make it again",
-        ));
+    if !header.fits(element_bytes, array.len) {
+        return Err(cut_short(path, &header.shape));
     }
-    Ok(NpyArray { shape, data })
+    Ok(array)
+}
+
+/// A file that ends before the last element.
+pub(super) fn cut_short(path: &Path, shape: &[u64]) -> FileError {
+    FileError::new(
+        path,
+        format_args!("is cut short: its header promises {}", shape_text(shape)),
+        "copy or make it again",
+    )
+}
+
+/// What kept a header from being read.
+pub(super) fn wrong_header(path: &Path, error: &io::Error) -> FileError {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidData => {
+            FileError::new(path, "is not a .npy file", "save it with numpy.save")
+        }
+        _ => FileError::reading(path, error),
+    }
 }
 
 /// Writes an array whole; `fill` writes its elements.
@@ -114,36 +177,8 @@ fn header_text(reader: &mut impl Read) -> io::Result<(String, u64)> {
     }
     let mut text = vec![0u8; len];
     reader.read_exact(&mut text)?;
-    let text = String::from_utf8(text).map_err(|_| invalid())?;
+    // UTF-8 from version 3 on, Latin-1 before.
+    let text = String::from_utf8(text)
+        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect());
     Ok((text, before + len as u64))
-}
-
-/// What stands after a key of the dictionary, to its end.
-fn value_of<'a>(header: &'a str, key: &str) -> Option<&'a str> {
-    let after = [format!("'{key}'"), format!("\"{key}\"")]
-        .iter()
-        .find_map(|quoted| Some(&header[header.find(quoted)? + quoted.len()..]))?;
-    Some(after.trim_start().strip_prefix(':')?.trim_start())
-}
-
-/// The text between the quotes at the beginning, or up to the comma where there are none.
-fn quoted(value: &str) -> &str {
-    match value.chars().next() {
-        Some(quote @ ('\'' | '"')) => value[1..].split(quote).next().unwrap_or_default(),
-        _ => value.split(", '").next().unwrap_or_default(),
-    }
-}
-
-fn tuple(value: &str) -> Option<Vec<u64>> {
-    let inside = value.strip_prefix('(')?.split(')').next()?;
-    inside
-        .split(',')
-        .map(str::trim)
-        .filter(|side| !side.is_empty())
-        .map(|side| side.parse().ok())
-        .collect()
-}
-
-fn not_npy(path: &Path) -> FileError {
-    FileError::new(path, "is not a .npy file", "save it with numpy.save")
 }

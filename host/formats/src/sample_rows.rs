@@ -7,8 +7,11 @@ pub(super) const COLUMNS: [&str; 8] = [
     "theta_i", "phi_i", "theta_v", "phi_v", "r", "g", "b", "frame",
 ];
 
-/// The largest frame number that float32 holds exactly, with all numbers below it.
-pub(super) const LAST_FRAME: f32 = 16_777_216.0;
+/// The largest number of a frame; the next one stands for none.
+pub(super) const LAST_FRAME: u32 = Sample::NO_FRAME - 1;
+
+/// The largest number of a frame that float32 tells from the next one.
+pub(super) const LAST_FRAME_IN_SINGLE: u32 = (1 << 24) - 1;
 
 /// Whether any sample says which frame it came from.
 pub(super) fn have_frames(samples: &[Sample]) -> bool {
@@ -18,12 +21,34 @@ pub(super) fn have_frames(samples: &[Sample]) -> bool {
 }
 
 /// A frame number as it stands in a file.
-pub(super) fn frame_in_file(frame: u32) -> f32 {
+pub(super) fn frame_in_file(frame: u32) -> f64 {
     if frame == Sample::NO_FRAME {
         -1.0
     } else {
-        frame as f32
+        f64::from(frame)
     }
+}
+
+/// The frame of a number in a file whose numbers are told apart up to `last`.
+pub(super) fn frame_of_number(number: f64, last: u32) -> Result<u32, BadRow> {
+    if number == -1.0 {
+        return Ok(Sample::NO_FRAME);
+    }
+    if number.fract() != 0.0 || !(0.0..=f64::from(LAST_FRAME)).contains(&number) {
+        return Err(BadRow {
+            problem: format!("frame {number} is no number of a frame"),
+            remedy: "give whole numbers from 0 to 4294967294, or -1 where it is unknown",
+        });
+    }
+    if number > f64::from(last) {
+        return Err(BadRow {
+            problem: format!(
+                "frame {number} cannot be told from its neighbours: numbers of this type are whole up to {last}"
+            ),
+            remedy: "save float64, or number the frames from 0",
+        });
+    }
+    Ok(number as u32)
 }
 
 /// What is wrong with a row.
@@ -43,14 +68,7 @@ pub(super) fn sample_from_row(row: &[f32]) -> Result<Sample, BadRow> {
     }
     let frame = match row.get(7) {
         None => Sample::NO_FRAME,
-        Some(&-1.0) => Sample::NO_FRAME,
-        Some(&f) if f.fract() == 0.0 && (0.0..=LAST_FRAME).contains(&f) => f as u32,
-        Some(&f) => {
-            return Err(BadRow {
-                problem: format!("frame {f} is no number of a frame"),
-                remedy: "give whole numbers from 0 to 16777216, or -1 where it is unknown",
-            });
-        }
+        Some(frame) => frame_of_number(f64::from(*frame), LAST_FRAME_IN_SINGLE)?,
     };
     Ok(Sample {
         theta_i_deg: row[0],
@@ -131,6 +149,16 @@ pub(super) mod tests {
             (5, f32::NAN, "g is NaN"),
             (7, 1.5, "frame 1.5 is no number of a frame"),
             (7, f32::NAN, "frame NaN is no number of a frame"),
+            (
+                7,
+                4_294_967_296.0,
+                "frame 4294967296 is no number of a frame",
+            ),
+            (
+                7,
+                16_777_216.0,
+                "frame 16777216 cannot be told from its neighbours: numbers of this type are whole up to 16777215",
+            ),
         ] {
             let mut bad = row;
             bad[column] = value;

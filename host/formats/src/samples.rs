@@ -1,26 +1,31 @@
-//! Samples as a file: `.npy` (float32, N × 7, or N × 8 with the number of the frame last) or `.csv`
-//! (a header with the same names).
+//! Samples as a file: numpy's arrays (`.npy`, `.npz`) and tables of text (`.csv`, `.tsv`, `.txt`).
 //!
 //! Columns: `theta_i, phi_i, theta_v, phi_v` in degrees, `r, g, b`, and optionally `frame`, −1
-//! where it is unknown.
+//! where it is unknown. What is read is wider: other names, units, separators, types and orders.
+//! Written are float32 `.npy` of N × 7 or N × 8, and `.csv` with these names in a header.
 
 pub use crate::format::{SampleNote, SamplesRead};
 
-use crate::format::{Content, SampleFormat};
+use crate::format::{Content, ReadSamples, SampleFormat, WriteSamples};
 use crate::sample_rows::LAST_FRAME;
-use crate::{FileError, sample_note, table};
+use crate::{FileError, sample_note, samples_csv, table};
 use gonia_brdf::Sample;
 use gonia_rig::Scale;
 use std::path::{Path, PathBuf};
 
-/// Reads samples; the format is recognised by the first bytes, else by the ending. Ten million from `.npy` take well below a second.
+/// Endings besides `.csv` under which a table of text is read, with a header or without.
+const TEXT_ENDINGS: [&str; 2] = ["txt", "tsv"];
+
+/// Reads samples; the format is recognised by the first bytes, else by the ending. Ten million from
+/// `.npy` of float32 take well below a second.
 ///
 /// # Errors
-/// One line naming the file and, where there is one, the row (counted from 0 in `.npy`) or line:
-/// of no known format, another shape, type or order, a value that is not finite, a polar angle outside
-/// 0° ≤ θ ≤ 90°, or a frame number that is none.
+/// One line naming the file and, where there is one, the row (counted from 0 in arrays) or line: of no
+/// known format, columns that are missing or that could be more than one thing, a value that is not
+/// finite, a polar angle outside 0° ≤ θ ≤ 90°, or a frame number that is none or that its type does
+/// not tell from the next one.
 pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
-    let mut read = (format_of_file(path)?.read)(path)?;
+    let mut read = (reader_of(path)?)(path)?;
     sample_note::add_to(&mut read, path)?;
     Ok(read)
 }
@@ -110,10 +115,10 @@ pub fn read_samples_of_all(
             }
         }
         if let Some(last) = last {
-            if last as f32 > LAST_FRAME {
+            if last > LAST_FRAME {
                 return Err(FileError::new(
                     path,
-                    format_args!("brings the frames to number {last}"),
+                    format_args!("brings the frames beyond number {LAST_FRAME}"),
                     "number the frames of each file from 0",
                 ));
             }
@@ -135,7 +140,7 @@ pub fn read_samples_of_all(
 /// # Errors
 /// Another ending, or the file cannot be written.
 pub fn write_samples(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
-    (format_of_name(path)?.write)(path, samples, None)?;
+    (writer_of(path)?.0)(path, samples, None)?;
     sample_note::write_beside(path, None)
 }
 
@@ -149,9 +154,9 @@ pub fn write_noted_samples(
     samples: &[Sample],
     note: &SampleNote,
 ) -> Result<(), FileError> {
-    let format = format_of_name(path)?;
-    (format.write)(path, samples, Some(note))?;
-    sample_note::write_beside(path, (!format.holds_notes).then_some(note))
+    let (write, holds_notes) = writer_of(path)?;
+    write(path, samples, Some(note))?;
+    sample_note::write_beside(path, (!holds_notes).then_some(note))
 }
 
 /// Whether samples can be written under this name, before they are made.
@@ -159,42 +164,58 @@ pub fn write_noted_samples(
 /// # Errors
 /// Another ending.
 pub fn check_sample_name(path: &Path) -> Result<(), FileError> {
-    format_of_name(path).map(|_| ())
+    writer_of(path).map(|_| ())
 }
 
-/// The endings of the formats that are read and written, for messages: `.npy or .csv`.
-pub fn sample_formats() -> String {
-    table::endings(is_samples)
+fn is_written(content: &Content) -> bool {
+    matches!(content, Content::Samples(samples) if samples.write.is_some())
 }
 
 fn is_samples(content: &Content) -> bool {
     matches!(content, Content::Samples(_))
 }
 
-fn format_of_file(path: &Path) -> Result<&'static SampleFormat, FileError> {
+fn reader_of(path: &Path) -> Result<ReadSamples, FileError> {
     match table::format_of_file(path)?.map(|format| &format.content) {
-        Some(Content::Samples(samples)) => Ok(samples),
+        Some(Content::Samples(samples)) => Ok(samples.read),
+        // A table of text whose header names the columns is one under any name.
+        _ if is_text(path) || samples_csv::names_samples(path) => Ok(samples_csv::read),
         Some(Content::Foreign(foreign)) => Err(FileError::new(
             path,
             format_args!("is a {}", foreign.name),
             "import it first (gonia import)",
         )),
-        _ => Err(unknown(path)),
+        _ => Err(unknown(path, is_samples)),
     }
 }
 
-fn format_of_name(path: &Path) -> Result<&'static SampleFormat, FileError> {
+/// Whether the ending promises a table of text.
+fn is_text(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.is_some_and(|ending| {
+        TEXT_ENDINGS
+            .iter()
+            .any(|text| ending.eq_ignore_ascii_case(text))
+    })
+}
+
+/// The writer by the name's ending, and whether its files hold notes.
+fn writer_of(path: &Path) -> Result<(WriteSamples, bool), FileError> {
     match table::format_of_name(path).map(|format| &format.content) {
-        Some(Content::Samples(samples)) => Ok(samples),
-        _ => Err(unknown(path)),
+        Some(Content::Samples(SampleFormat {
+            write: Some(write),
+            holds_notes,
+            ..
+        })) => Ok((*write, *holds_notes)),
+        _ => Err(unknown(path, is_written)),
     }
 }
 
-fn unknown(path: &Path) -> FileError {
+fn unknown(path: &Path, endings: fn(&Content) -> bool) -> FileError {
     FileError::new(
         path,
         "is no known kind of sample file",
-        format_args!("name it {}", sample_formats()),
+        format_args!("name it {}", table::endings(endings)),
     )
 }
 
@@ -225,8 +246,11 @@ mod tests {
         let error = write_samples(&other, &samples).unwrap_err().to_string();
         assert!(error.ends_with("name it .npy or .csv"), "{error}");
         std::fs::copy(dir.path().join("b.csv"), &other).unwrap();
-        let error = read_samples(&other).unwrap_err().to_string();
-        assert!(error.ends_with("name it .npy or .csv"), "{error}");
+        assert_eq!(read_samples(&other).unwrap().samples, samples);
+        let unknown = dir.path().join("a.log");
+        std::fs::write(&unknown, "x").unwrap();
+        let error = read_samples(&unknown).unwrap_err().to_string();
+        assert!(error.ends_with("name it .npy, .csv or .npz"), "{error}");
         // The first bytes of a .npy say what it is.
         std::fs::copy(dir.path().join("b.npy"), &other).unwrap();
         assert_eq!(read_samples(&other).unwrap().samples, samples);
@@ -282,5 +306,24 @@ mod tests {
             let error = one(&paths, said).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
         }
+    }
+
+    #[test]
+    fn frames_of_several_files_that_no_number_is_left_for_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.npy", "b.npy"].map(|name| dir.path().join(name));
+        let mut samples = some_samples(3);
+        samples[2].frame = LAST_FRAME - 1;
+        write_samples(&a, &samples).unwrap();
+        samples[2].frame = 0;
+        write_samples(&b, &samples).unwrap();
+        let all = read_samples_of_all(&[a.clone(), b.clone()], None)
+            .unwrap()
+            .samples;
+        assert_eq!(all[5].frame, LAST_FRAME);
+        let error = read_samples_of_all(&[a, b.clone(), b], None)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("beyond number 4294967294"), "{error}");
     }
 }

@@ -61,7 +61,7 @@ pub fn level_remark(dense: &DenseBrdf, cells: &[Cell], samples: &Path) -> Option
             let is_near = |d: Direction| d.theta_deg() <= LEVEL_THETA_MAX_DEG;
             let ratio = cell.value[1] / f64::from(dense.lookup(light, view)[1]);
             (is_near(light) && is_near(view) && ratio > 0.0 && ratio.is_finite())
-                .then(|| ratio.ln())
+                .then(|| ratio.natural_log())
         })
         .collect();
     let middle = logs.len() / 2;
@@ -69,12 +69,12 @@ pub fn level_remark(dense: &DenseBrdf, cells: &[Cell], samples: &Path) -> Option
         return None;
     }
     let (_, median, _) = logs.select_nth_unstable_by(middle, f64::total_cmp);
-    (median.abs() > LEVEL_MAX.ln()).then(|| {
+    (median.abs() > LEVEL_MAX.natural_log()).then(|| {
         Remark::new(
             samples.display(),
             format_args!(
                 "its values are {:.3} times those of the dense BRDF (median): they are not of one measurement or not of one scale",
-                median.exp()
+                median.exponential()
             ),
             "give the samples that it was filled from",
         )
