@@ -27,6 +27,9 @@ enum Expected {
     Refused(&'static str),
 }
 
+/// What came in, the name and the bytes of its file, and what is said of it.
+type File = (&'static str, &'static str, Vec<u8>, Expected);
+
 /// Samples of a broad lobe on a matte ground, spread evenly, each number as a CSV has it.
 fn rows() -> Vec<[f64; 7]> {
     // Steps of the additive sequence that fills four dimensions evenly (Roberts 2018).
@@ -139,7 +142,7 @@ fn filled(dir: &Path, name: &str) -> (std::process::Output, Option<String>) {
     (output, values)
 }
 
-fn check(files: Vec<(&str, &str, Vec<u8>, Expected)>) -> Vec<Case> {
+fn check(files: Vec<File>) -> Vec<Case> {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("usual.csv"), table(NAMES, ",", ".", 7)).unwrap();
     let (output, usual) = filled(dir.path(), "usual.csv");
@@ -168,7 +171,8 @@ fn check(files: Vec<(&str, &str, Vec<u8>, Expected)>) -> Vec<Case> {
     cases
 }
 
-fn tables_that_are_read() -> Vec<(&'static str, &'static str, Vec<u8>, Expected)> {
+// long: a table, one entry a case.
+fn tables_that_are_read() -> Vec<File> {
     let usual = || table(NAMES, ",", ".", 7);
     let named = |names: &str| table(names, ",", ".", 7).into_bytes();
     let utf16 = || {
@@ -265,7 +269,7 @@ fn tables_that_are_read() -> Vec<(&'static str, &'static str, Vec<u8>, Expected)
     ]
 }
 
-fn tables_that_are_refused() -> Vec<(&'static str, &'static str, Vec<u8>, Expected)> {
+fn tables_that_are_refused() -> Vec<File> {
     use Expected::Refused;
     vec![
         (
@@ -313,7 +317,8 @@ fn tables_that_are_refused() -> Vec<(&'static str, &'static str, Vec<u8>, Expect
     ]
 }
 
-fn arrays() -> Vec<(&'static str, &'static str, Vec<u8>, Expected)> {
+// long: a table, one entry a case.
+fn arrays() -> Vec<File> {
     use Expected::{Read, Refused};
     let by_rows = || rows().into_iter().flatten();
     let records = "[('theta_in', '<f8'), ('phi_in', '<f8'), ('theta_out', '<f8'), ('phi_out', '<f8'), ('rgb', '<f8', (3,))]";

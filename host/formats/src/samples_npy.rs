@@ -60,15 +60,25 @@ fn write(path: &Path, samples: &[Sample], _: Option<&SampleNote>) -> Result<(), 
             buffer.clear();
             for s in chunk {
                 let [r, g, b] = s.rgb;
-                let [theta_i, phi_i, theta_v, phi_v] =
-                    [s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg];
-                let row = [theta_i, phi_i, theta_v, phi_v, r, g, b].map(f64::from);
-                let row = row.into_iter().chain([frame_in_file(s.frame)]);
-                for value in row.take(columns) {
-                    if is_double {
+                let frame = frame_in_file(s.frame);
+                let row = [
+                    s.theta_i_deg,
+                    s.phi_i_deg,
+                    s.theta_v_deg,
+                    s.phi_v_deg,
+                    r,
+                    g,
+                    b,
+                    frame as f32,
+                ];
+                if is_double {
+                    for value in &row[..7] {
+                        buffer.extend_from_slice(&f64::from(*value).to_le_bytes());
+                    }
+                    buffer.extend_from_slice(&frame.to_le_bytes());
+                } else {
+                    for value in &row[..columns] {
                         buffer.extend_from_slice(&value.to_le_bytes());
-                    } else {
-                        buffer.extend_from_slice(&(value as f32).to_le_bytes());
                     }
                 }
             }
