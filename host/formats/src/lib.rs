@@ -37,6 +37,7 @@ pub mod masks_csv;
 mod merl;
 mod ngan;
 mod npy;
+mod odd_samples;
 pub mod photo;
 pub mod plan_csv;
 pub mod raw_frame;

@@ -8,7 +8,7 @@ pub use crate::format::SamplesRead;
 
 use crate::format::{Content, SampleFormat};
 use crate::sample_rows::LAST_FRAME;
-use crate::{FileError, table};
+use crate::{FileError, odd_samples, table};
 use gonia_brdf::Sample;
 use std::path::{Path, PathBuf};
 
@@ -16,10 +16,13 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// One line naming the file and, where there is one, the row (counted from 0 in `.npy`) or line:
-/// of no known format, another shape, type or order, a value that is not finite, a polar angle outside
-/// 0° ≤ θ ≤ 90°, or a frame number that is none.
+/// of no known format, another shape, type or order, a frame number that is none, or more than half of the
+/// samples below the horizon or not finite. Fewer of these are left out, negative polar angles are
+/// turned, and the remarks say how many.
 pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
-    (format_of_file(path)?.read)(path)
+    let mut read = (format_of_file(path)?.read)(path)?;
+    odd_samples::sort_out(path, &mut read)?;
+    Ok(read)
 }
 
 /// Reads the samples of several sessions of one material as one: frames are numbered on, so that no

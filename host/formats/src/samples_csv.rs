@@ -84,7 +84,7 @@ mod tests {
         );
         let error = read("1,2,3,100,20,30,40\n").unwrap_err().to_string();
         assert!(
-            error.contains("s.csv, line 2: theta_i 100 is not a polar angle"),
+            error.contains("s.csv, line 2: 1 of 1 samples lie below the horizon"),
             "{error}"
         );
     }
