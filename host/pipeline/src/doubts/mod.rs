@@ -9,6 +9,7 @@ mod angles;
 mod energy;
 mod layout;
 mod reciprocity;
+mod surface;
 mod values;
 
 pub use energy::DirectionalAlbedo;
@@ -25,7 +26,7 @@ use gonia_rig::{Oddities, Oddity, Remark};
 /// Angles in radians, or values that are mostly not positive.
 pub(crate) fn of_samples(samples: &[Sample]) -> Result<Vec<Remark>, Error> {
     let mut remarks: Vec<Remark> = angles::in_radians(samples)?.into_iter().collect();
-    remarks.extend(angles::from_the_surface(samples));
+    remarks.extend(surface::remark(samples));
     remarks.extend(values::not_positive(samples)?);
     Ok(remarks)
 }
@@ -90,3 +91,6 @@ fn some(samples: &[Sample], at_most: usize) -> Vec<&Sample> {
     let step = samples.len().div_ceil(at_most).max(1);
     samples.iter().step_by(step).collect()
 }
+
+#[cfg(test)]
+mod tests;
