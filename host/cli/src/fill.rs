@@ -211,7 +211,10 @@ fn origins(counts: &OriginCounts) -> [(String, String); 4] {
         ("cells measured", table::count(counts.measured)),
         ("cells by reciprocity", table::count(counts.reciprocal)),
         ("cells interpolated", table::count(counts.interpolated)),
-        ("cells extrapolated", format!("{extrapolated} ({guessed:.1} %)")),
+        (
+            "cells extrapolated",
+            format!("{extrapolated} ({guessed:.1} %)"),
+        ),
     ]
     .map(|(name, text)| (name.to_owned(), text))
 }

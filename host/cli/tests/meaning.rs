@@ -33,7 +33,11 @@ fn good() -> Vec<Row> {
 fn with_value([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> Row {
     let vector = |theta: f64, phi: f64| {
         let (theta, phi) = (theta.to_radians(), phi.to_radians());
-        [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]
+        [
+            theta.sin() * phi.cos(),
+            theta.sin() * phi.sin(),
+            theta.cos(),
+        ]
     };
     let (l, v) = (vector(theta_i, phi_i), vector(theta_v, phi_v));
     let half = [l[0] + v[0], l[1] + v[1], l[2] + v[2]];
@@ -44,7 +48,9 @@ fn with_value([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> Row {
 /// The same rows, each changed by its number.
 fn changed(rows: &[Row], change: impl Fn(usize, &mut Row)) -> Vec<Row> {
     let mut rows = rows.to_vec();
-    rows.iter_mut().enumerate().for_each(|(k, row)| change(k, row));
+    rows.iter_mut()
+        .enumerate()
+        .for_each(|(k, row)| change(k, row));
     rows
 }
 
@@ -55,7 +61,11 @@ fn case(came_in: &str, rows: &[Row], arguments: &[&str], code: i32, words: &[&st
     let mut csv = String::from("theta_i,phi_i,theta_v,phi_v,r,g,b\n");
     for [theta_i, phi_i, theta_v, phi_v, value] in rows {
         let values = format!("{value:.6},{value:.6},{value:.6}");
-        writeln!(csv, "{theta_i:.4},{phi_i:.4},{theta_v:.4},{phi_v:.4},{values}").unwrap();
+        writeln!(
+            csv,
+            "{theta_i:.4},{phi_i:.4},{theta_v:.4},{phi_v:.4},{values}"
+        )
+        .unwrap();
     }
     fs::write(&samples, csv).unwrap();
     let mut all = vec!["fill", text(&samples), "-o", text(&dense), "--step", "10"];
@@ -69,7 +79,11 @@ fn case(came_in: &str, rows: &[Row], arguments: &[&str], code: i32, words: &[&st
     for word in words {
         assert!(case.said().contains(word), "{came_in}: {}", case.said());
     }
-    assert!(!words.is_empty() || case.said().is_empty(), "{came_in}: {}", case.said());
+    assert!(
+        !words.is_empty() || case.said().is_empty(),
+        "{came_in}: {}",
+        case.said()
+    );
     if code == 0 {
         for row in ["cells extrapolated", "directional albedo"] {
             assert!(printed.contains(row), "{came_in}: {printed}");
@@ -86,7 +100,9 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
         case(
             "all angles in radians",
             &changed(&good, |_, row| {
-                row[..4].iter_mut().for_each(|angle| *angle = angle.to_radians());
+                row[..4]
+                    .iter_mut()
+                    .for_each(|angle| *angle = angle.to_radians());
             }),
             &[],
             1,
@@ -133,7 +149,10 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
             }),
             &[],
             0,
-            &["s.csv, line 2: 10 of 400 samples lie below the horizon", "left out"],
+            &[
+                "s.csv, line 2: 10 of 400 samples lie below the horizon",
+                "left out",
+            ],
         ),
         case(
             "8 of 400 samples without a value",
@@ -144,7 +163,10 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
             }),
             &[],
             0,
-            &["s.csv, line 5: 8 of 400 samples hold a number that is not finite", "left out"],
+            &[
+                "s.csv, line 5: 8 of 400 samples hold a number that is not finite",
+                "left out",
+            ],
         ),
         case(
             "most samples below the horizon (transmission)",
@@ -192,7 +214,9 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
         ),
         case(
             "30 % of the values negative",
-            &changed(&good, |k, row| row[4] *= if k % 10 < 3 { -1.0 } else { 1.0 }),
+            &changed(&good, |k, row| {
+                row[4] *= if k % 10 < 3 { -1.0 } else { 1.0 }
+            }),
             &[],
             0,
             &["120 of 400 samples are not above zero"],
@@ -212,7 +236,10 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
             }),
             &[],
             0,
-            &["one azimuth of light, 180 degrees", "% of the cells are extrapolated"],
+            &[
+                "one azimuth of light, 180 degrees",
+                "% of the cells are extrapolated",
+            ],
         ),
         case(
             "a scan in the plane of incidence",
@@ -222,7 +249,10 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
             }),
             &[],
             0,
-            &["lie in the plane of incidence", "% of the cells are extrapolated"],
+            &[
+                "lie in the plane of incidence",
+                "% of the cells are extrapolated",
+            ],
         ),
         case(
             "one direction of light",

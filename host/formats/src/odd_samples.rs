@@ -132,7 +132,10 @@ mod tests {
         assert!(said.contains("line 4: 2 of 3 samples lie below"), "{said}");
         let exchanged = "10,0,20,0,1,1,1\n200,10,190,20,1,1,1\n300,40,10,50,1,1,1\n";
         let said = read(exchanged).unwrap_err();
-        assert!(said.ends_with("exchange the columns theta and phi"), "{said}");
+        assert!(
+            said.ends_with("exchange the columns theta and phi"),
+            "{said}"
+        );
         assert!(read("").unwrap().samples.is_empty());
     }
 }

@@ -131,7 +131,10 @@ mod tests {
         let read = read_samples(&path).unwrap();
         assert_eq!(read.samples.len(), 19_999);
         let said = read.remarks[0].to_string();
-        assert!(said.contains("s.npy, row 17000: 1 of 20000 samples hold a number"), "{said}");
+        assert!(
+            said.contains("s.npy, row 17000: 1 of 20000 samples hold a number"),
+            "{said}"
+        );
     }
 
     #[test]

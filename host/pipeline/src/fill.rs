@@ -1,12 +1,13 @@
 //! Samples → bins → dense BRDF.
 
-use crate::doubts::{self, DirectionalAlbedo};
 use crate::Error;
+use crate::doubts::{self, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{
-    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, OriginCounts, Preset,
+    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, OriginCounts,
+    Preset,
 };
 use gonia_brdf::{Bin, Bins, DenseBrdf, Grid};
 use gonia_formats::dense::write_dense_by_rows;

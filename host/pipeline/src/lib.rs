@@ -41,7 +41,8 @@ pub use compare::{CompareError, Options, Side, Table, compare};
 pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
-    FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins, fill_to_file,
+    FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins,
+    fill_to_file,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

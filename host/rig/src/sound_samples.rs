@@ -146,7 +146,12 @@ mod tests {
         assert_eq!(samples, [good, sample(30.0, 120.0, 20.0, 1.0), both]);
         assert_eq!((odd.samples, odd.left_out()), (7, 4));
         assert_eq!(
-            (odd.signed.count, odd.below.count, odd.no_angle.count, odd.not_finite.count),
+            (
+                odd.signed.count,
+                odd.below.count,
+                odd.no_angle.count,
+                odd.not_finite.count
+            ),
             (2, 1, 1, 2)
         );
         assert_eq!(odd.below.first, Some((2, "theta_v -91".into())));

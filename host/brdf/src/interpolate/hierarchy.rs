@@ -81,11 +81,7 @@ impl Hierarchy {
 
     /// The same. With `values`, the bins that the data came from, logarithms are replaced where the signal is below
     /// the noise; the variance of one sample's, where these are most, is [`Self::noise_variance`].
-    pub(super) fn with_values(
-        half: Vec<Datum>,
-        stands_for: usize,
-        values: Option<&Bins>,
-    ) -> Self {
+    pub(super) fn with_values(half: Vec<Datum>, stands_for: usize, values: Option<&Bins>) -> Self {
         let (mut bins, mut starts, noise_variance) = in_order(half, stands_for, values);
         let n = bins.len();
         append_mirror_images(&mut bins);

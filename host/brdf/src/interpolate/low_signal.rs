@@ -7,8 +7,9 @@
 //! Linear Models*, section 2.5). It is linear in v, and so its mean is that of the truth. Data without such values
 //! around them stay as they are.
 
-use super::datum::Datum;
+use super::datum::{Datum, SIGMA_PER_MAD};
 use crate::bins::Bins;
+use crate::quantile::median;
 use rayon::prelude::*;
 
 /// Leaves, as a power of two, in which values at or below zero are looked for: two or three hundred bins.
@@ -28,16 +29,27 @@ struct Sums {
     square: f64,
     not_positive: f64,
     square_below: f64,
+    /// Robust standard deviation within a leaf, times its data.
+    spread: f64,
 }
 
 impl Sums {
-    fn of(values: impl Iterator<Item = f64>) -> Self {
-        values.fold(Self::default(), |sums, v| Self {
-            count: sums.count + 1.0,
+    fn of(values: &[f64]) -> Self {
+        let mut near: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+        let middle = median(&mut near);
+        near.iter_mut().for_each(|v| *v = (*v - middle).abs());
+        let count = values.len() as f64;
+        let start = Self {
+            count,
+            spread: count * f64::from(SIGMA_PER_MAD * median(&mut near)),
+            ..Self::default()
+        };
+        values.iter().fold(start, |sums, v| Self {
             value: sums.value + v,
             square: sums.square + v * v,
-            not_positive: sums.not_positive + f64::from(u8::from(v <= 0.0)),
+            not_positive: sums.not_positive + f64::from(u8::from(*v <= 0.0)),
             square_below: sums.square_below + v.min(0.0).powi(2),
+            ..sums
         })
     }
 
@@ -48,6 +60,7 @@ impl Sums {
             square: self.square + other.square,
             not_positive: self.not_positive + other.not_positive,
             square_below: self.square_below + other.square_below,
+            spread: self.spread + other.spread,
         }
     }
 
@@ -55,15 +68,24 @@ impl Sums {
         self.value / self.count.max(1.0)
     }
 
-    /// Standard deviation of the noise, as far as values below zero show it: they reach about half of it below zero
-    /// where the signal is as large. Of values that were clipped at zero, it is that of all.
+    /// Standard deviation of the noise: what values of a leaf scatter by, unless a highlight does; values
+    /// below zero reach down by half of it where the signal is as large. Where these lie far below what all
+    /// scatter by, they are outliers, and there is no noise to see.
     fn noise(&self) -> f64 {
-        if self.square_below > 0.0 {
-            return 2.0 * (self.square_below / self.not_positive).sqrt();
+        let spread = self.spread / self.count.max(1.0);
+        let depth = (self.square_below / self.not_positive.max(1.0)).sqrt();
+        if depth > OUTLIER * spread {
+            0.0
+        } else {
+            // Zeros alone may stand for what was not measured.
+            spread.min(2.0 * depth)
         }
-        (self.square / self.count.max(1.0) - self.mean().powi(2)).max(0.0).sqrt()
     }
 }
+
+/// Values below zero by so many standard deviations, in the mean of squares, are no noise: that of noise alone
+/// is one.
+const OUTLIER: f64 = 1.5;
 
 /// Replaces logarithms where the signal is below the noise. `data` are in the order of a balanced tree whose
 /// leaves, two to some power, begin at `starts`. Noise then differs by orders of magnitude between data: each counts
@@ -88,16 +110,11 @@ pub(super) fn linearize(data: &mut [Datum], starts: &[u32], bins: &Bins) -> Opti
             .filter_map(|(number, (leaf, variances))| {
                 let around = around(&levels, number)?;
                 for (datum, variance) in leaf.iter_mut().zip(variances) {
-                    let signal = around.mean.map_or(value(datum).abs(), |(mean, _)| mean);
-                    let own = (around.noise / signal.max(1e-3 * around.noise)).powi(2) as f32;
-                    *variance += own.max(sound) - sound;
-                    if let Some((mean, bias)) = around.mean {
-                        datum.log_value[c] = (mean.ln() + value(datum) / mean - 1.0 + bias) as f32;
-                    }
+                    let log = around.mean.ln() + value(datum) / around.mean - 1.0;
+                    datum.log_value[c] = (log + around.bias) as f32;
+                    *variance += (around.variance as f32).max(sound) - sound;
                 }
-                let (mean, _) = around.mean?;
-                let squares = (around.noise / mean).powi(2) * leaf.len() as f64;
-                Some((leaf.len(), squares))
+                Some((leaf.len(), around.variance * leaf.len() as f64))
             })
             .collect();
         replaced += found.iter().map(|f| f.0).sum::<usize>();
@@ -140,7 +157,7 @@ fn leaves<'a>(
 fn levels(data: &[Datum], starts: &[u32], value: impl Fn(&Datum) -> f64) -> Vec<Vec<Sums>> {
     let leaves = starts.windows(2).map(|w| {
         let leaf = &data[w[0] as usize..w[1] as usize];
-        Sums::of(leaf.iter().map(&value))
+        Sums::of(&leaf.iter().map(&value).collect::<Vec<f64>>())
     });
     let mut levels: Vec<Vec<Sums>> = vec![leaves.collect()];
     while let Some(last) = levels.last().filter(|level| level.len() > 1) {
@@ -154,38 +171,39 @@ fn levels(data: &[Datum], starts: &[u32], value: impl Fn(&Datum) -> f64) -> Vec<
     levels
 }
 
-/// What values at or below zero around a leaf tell.
+/// What is known around a leaf whose signal is below the noise.
 struct Around {
-    /// Standard deviation of the noise.
-    noise: f64,
-    /// The mean around the leaf, and by how much its logarithm is too low in the mean; `None` where the leaf's own
-    /// logarithms are sound, or there is no mean to take.
-    mean: Option<(f64, f64)>,
+    /// The mean.
+    mean: f64,
+    /// By how much its logarithm is too low in the mean.
+    bias: f64,
+    /// Variance of a value over the square of the mean.
+    variance: f64,
 }
 
-/// `None` where no value is at or below zero.
+/// `None` where logarithms are sound, or there is no mean to take.
 fn around(levels: &[Vec<Sums>], number: usize) -> Option<Around> {
     let at = |level: usize| levels[level][number >> level];
     let top = levels.len() - 1;
     let (leaf, window) = (at(0), at(WINDOW.min(top)));
     let noise = window.noise();
-    if window.not_positive == 0.0 {
+    if window.not_positive == 0.0 || noise == 0.0 || leaf.mean() >= SOUND * noise {
         return None;
-    }
-    if leaf.mean() >= SOUND * noise {
-        return Some(Around { noise, mean: None });
     }
     // As the window says, not as the leaf does: a leaf that is high by chance would be taken for its mean.
     let wanted = (WELL_ABOVE * noise / window.mean().max(1e-12 * noise)).powi(2);
     let enough = (0..=top).find(|level| at(*level).count >= wanted);
-    let mean = (0..=enough.unwrap_or(top)).rev().find_map(|level| {
+    (0..=enough.unwrap_or(top)).rev().find_map(|level| {
         let sums = at(level);
         let mean = sums.mean();
         let same = (leaf.mean() - mean).abs() <= SAME * noise / leaf.count.max(1.0).sqrt();
-        let variance = (sums.square / sums.count - mean * mean).max(0.0) / sums.count;
-        (mean > 0.0 && same).then(|| (mean, 0.5 * variance / (mean * mean)))
-    });
-    Some(Around { noise, mean })
+        let of_mean = (sums.square / sums.count - mean * mean).max(0.0) / sums.count;
+        (mean > 0.0 && same).then(|| Around {
+            mean,
+            bias: 0.5 * of_mean / (mean * mean),
+            variance: (noise / mean).powi(2),
+        })
+    })
 }
 
 #[cfg(test)]
@@ -235,7 +253,10 @@ mod tests {
             let mut sorted = plane.clone();
             let median = crate::quantile::median(&mut sorted);
             let mean = plane.iter().sum::<f32>() / plane.len() as f32;
-            assert!((median / 0.001 - 1.0).abs() < 0.04, "{noise}: median {median}");
+            assert!(
+                (median / 0.001 - 1.0).abs() < 0.04,
+                "{noise}: median {median}"
+            );
             assert!((mean / 0.001 - 1.0).abs() < 0.06, "{noise}: mean {mean}");
         }
     }
@@ -250,6 +271,27 @@ mod tests {
             .filter(|(_, clean)| **clean > 0.1);
         let logs: Vec<f32> = bright.map(|(noisy, clean)| (noisy / clean).ln()).collect();
         let mean = logs.iter().sum::<f32>() / logs.len() as f32;
-        assert!(logs.len() > 1000 && mean.abs() < 0.05, "{mean} of {}", logs.len());
+        assert!(
+            logs.len() > 1000 && mean.abs() < 0.05,
+            "{mean} of {}",
+            logs.len()
+        );
+    }
+
+    #[test]
+    fn signs_that_were_flipped_do_not_make_sound_values_noise() {
+        let sound = samples(0.1, 1.0, 0.0, 20_000);
+        let mut flipped = sound.clone();
+        for s in flipped.iter_mut().step_by(50) {
+            s.rgb = s.rgb.map(|v| -v);
+        }
+        let bins = Bins::new(Grid::with_step_deg(10.0).unwrap(), &flipped);
+        let data = Data::new(&bins);
+        assert_eq!(data.hierarchy().noise_variance(), None);
+        let (with, without) = (filled(&flipped), filled(&sound));
+        let logs = with.planes()[0].iter().zip(&without.planes()[0]);
+        let logs: Vec<f32> = logs.map(|(a, b)| (a / b).ln().abs()).collect();
+        let mean = logs.iter().sum::<f32>() / logs.len() as f32;
+        assert!(mean < 0.02, "{mean}");
     }
 }

@@ -124,12 +124,14 @@ impl Reach {
                 let rows = &rows[..self.rows[light / self.n_phi].min(rows.len())];
                 let (as_light, as_view) = (lights[light], views[light]);
                 rows.iter()
-                    .map(|[near_lights, near_views, both]| match (as_light, as_view) {
-                        (true, true) => near_lights + near_views - both,
-                        (true, false) => *near_views,
-                        (false, true) => *near_lights,
-                        (false, false) => 0,
-                    })
+                    .map(
+                        |[near_lights, near_views, both]| match (as_light, as_view) {
+                            (true, true) => near_lights + near_views - both,
+                            (true, false) => *near_views,
+                            (false, true) => *near_lights,
+                            (false, false) => 0,
+                        },
+                    )
                     .sum::<u64>()
             })
             .sum()
@@ -206,7 +208,8 @@ mod tests {
                 .collect();
             let bins = Bins::new(grid, &samples);
             let cells = origins(&bins);
-            let count = |origin: Origin| cells.iter().filter(|o| **o == origin as u8).count() as u64;
+            let count =
+                |origin: Origin| cells.iter().filter(|o| **o == origin as u8).count() as u64;
             let counted = OriginCounts {
                 measured: count(Origin::Measured),
                 reciprocal: count(Origin::Reciprocal),

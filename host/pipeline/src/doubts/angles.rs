@@ -21,12 +21,8 @@ const MANY_ANGLES: usize = 6;
 /// # Errors
 /// Polar angles in radians.
 pub(super) fn in_radians(samples: &[Sample]) -> Result<Option<Remark>, Error> {
-    let largest = |angle: fn(&Sample) -> f32| {
-        samples
-            .par_iter()
-            .map(angle)
-            .reduce(|| 0.0f32, f32::max)
-    };
+    let largest =
+        |angle: fn(&Sample) -> f32| samples.par_iter().map(angle).reduce(|| 0.0f32, f32::max);
     let polar = largest(|s| s.theta_i_deg.max(s.theta_v_deg));
     if polar <= FRAC_PI_2 + ROUNDING {
         let count = different(samples, |s| [s.theta_i_deg, s.theta_v_deg]);
@@ -61,10 +57,7 @@ fn size(phi_deg: f32) -> f32 {
 
 /// How many different angles some thousand samples have.
 fn different(samples: &[Sample], angles: fn(&Sample) -> [f32; 2]) -> usize {
-    let mut all: Vec<f32> = some(samples, 5000)
-        .into_iter()
-        .flat_map(angles)
-        .collect();
+    let mut all: Vec<f32> = some(samples, 5000).into_iter().flat_map(angles).collect();
     all.sort_by(f32::total_cmp);
     all.dedup();
     all.len()

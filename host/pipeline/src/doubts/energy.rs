@@ -36,18 +36,14 @@ impl DirectionalAlbedo {
                 let row = &brdf.planes()[c][light * n..(light + 1) * n];
                 row.chunks(n_phi)
                     .zip(&rings)
-                    .map(|(ring, weight)| {
-                        weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>()
-                    })
+                    .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
                     .sum()
             })
         };
         let all: Vec<[f64; 3]> = (0..n).into_par_iter().map(of_light).collect();
         let by_polar_angle = all
             .chunks(n_phi)
-            .map(|ring| {
-                [0, 1, 2].map(|c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64)
-            })
+            .map(|ring| [0, 1, 2].map(|c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64))
             .collect();
         let measured = ((up_to_deg / step_deg).round() as usize + 1) * n_phi;
         let (mut highest, mut channel, mut place) = (f64::NEG_INFINITY, 0, 0);
@@ -73,7 +69,10 @@ impl DirectionalAlbedo {
     pub fn at(&self, theta_i_deg: f64) -> [f64; 3] {
         let last = self.by_polar_angle.len().saturating_sub(1);
         let nearest = ((theta_i_deg / self.step_deg).round() as usize).min(last);
-        self.by_polar_angle.get(nearest).copied().unwrap_or([0.0; 3])
+        self.by_polar_angle
+            .get(nearest)
+            .copied()
+            .unwrap_or([0.0; 3])
     }
 
     /// The channel's letter.

@@ -22,30 +22,41 @@ pub(crate) fn remark(samples: &[Sample], origins: &OriginCounts) -> Option<Remar
     }
     if one_direction(samples, |s| (s.theta_i_deg, s.phi_i_deg)) {
         return say(
-            format!("all have one direction of light: {follows}, and how values depend on the light was not measured"),
+            format!(
+                "all have one direction of light: {follows}, and how values depend on the light was not measured"
+            ),
             "measure more directions of light",
         );
     }
     if one_direction(samples, |s| (s.theta_v_deg, s.phi_v_deg)) {
         return say(
-            format!("all have one direction of view: {follows}, and how values depend on the view was not measured"),
+            format!(
+                "all have one direction of view: {follows}, and how values depend on the view was not measured"
+            ),
             "measure more directions of view",
         );
     }
     if samples.par_iter().all(in_plane) {
         return say(
-            format!("all lie in the plane of incidence: {follows}, and values out of this plane were not measured"),
+            format!(
+                "all lie in the plane of incidence: {follows}, and values out of this plane were not measured"
+            ),
             "measure views out of the plane of incidence; use the result within it only",
         );
     }
     let three_angles = [
         ("light", one_azimuth(samples)),
-        ("view", one_azimuth_of(samples, |s| (s.theta_v_deg, s.phi_v_deg))),
+        (
+            "view",
+            one_azimuth_of(samples, |s| (s.theta_v_deg, s.phi_v_deg)),
+        ),
     ];
     for (arm, azimuth) in three_angles {
         if let Some(azimuth) = azimuth {
             return say(
-                format!("all have one azimuth of {arm}, {azimuth:.0} degrees, as three-angle data of isotropic materials have: {follows}, and how values depend on the azimuth was not measured"),
+                format!(
+                    "all have one azimuth of {arm}, {azimuth:.0} degrees, as three-angle data of isotropic materials have: {follows}, and how values depend on the azimuth was not measured"
+                ),
                 "if the material is isotropic, add the samples turned about the normal to other azimuths; if not, measure these",
             );
         }

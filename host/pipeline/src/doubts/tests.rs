@@ -137,15 +137,26 @@ fn radians_are_refused_and_azimuths_in_radians_remarked_on() {
     for layout in LAYOUTS {
         let good = samples(material.brdf.as_ref(), layout, 0.0);
         let in_radians = |s: &Sample, polar: bool| Sample {
-            theta_i_deg: if polar { s.theta_i_deg.to_radians() } else { s.theta_i_deg },
-            theta_v_deg: if polar { s.theta_v_deg.to_radians() } else { s.theta_v_deg },
+            theta_i_deg: if polar {
+                s.theta_i_deg.to_radians()
+            } else {
+                s.theta_i_deg
+            },
+            theta_v_deg: if polar {
+                s.theta_v_deg.to_radians()
+            } else {
+                s.theta_v_deg
+            },
             phi_i_deg: s.phi_i_deg.to_radians(),
             phi_v_deg: s.phi_v_deg.to_radians(),
             ..*s
         };
         let all: Vec<Sample> = good.iter().map(|s| in_radians(s, true)).collect();
         let said = of_samples(&all).unwrap_err().to_string();
-        assert!(said.contains("they are radians") && said.contains("180/pi"), "{said}");
+        assert!(
+            said.contains("they are radians") && said.contains("180/pi"),
+            "{said}"
+        );
         let azimuths: Vec<Sample> = good.iter().map(|s| in_radians(s, false)).collect();
         let said = of_samples(&azimuths).unwrap()[0].to_string();
         assert!(said.contains("look like radians"), "{said}");
@@ -172,7 +183,10 @@ fn angles_from_the_surface_are_seen_where_the_material_shows_them() {
         }
     }
     println!("{seen:?}");
-    assert!(seen.iter().any(|(name, _)| *name == "brushed-metal"), "{seen:?}");
+    assert!(
+        seen.iter().any(|(name, _)| *name == "brushed-metal"),
+        "{seen:?}"
+    );
 }
 
 #[test]
@@ -183,13 +197,19 @@ fn values_that_are_mostly_below_zero_are_refused_and_some_are_counted() {
         s.rgb = s.rgb.map(|v| -v);
     }
     let some = said(&samples);
-    assert!(some[0].contains("40 of 400 samples are not above zero"), "{some:?}");
+    assert!(
+        some[0].contains("40 of 400 samples are not above zero"),
+        "{some:?}"
+    );
     for s in samples.iter_mut().skip(40) {
         s.rgb = s.rgb.map(|v| -v);
     }
     samples[0].rgb = [0.1; 3];
     let said = of_samples(&samples).unwrap_err().to_string();
-    assert!(said.contains("360 of 400 samples are not above zero"), "{said}");
+    assert!(
+        said.contains("360 of 400 samples are not above zero"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -208,25 +228,40 @@ fn slices_of_the_four_angles_are_named() {
             Some("one direction of light"),
         ),
         (
-            angles().map(|k| sample(k, 6.0 * k, 0.5, 90.0 * k)).collect(),
+            angles()
+                .map(|k| sample(k, 6.0 * k, 0.5, 90.0 * k))
+                .collect(),
             Some("one direction of view"),
         ),
         (
             angles()
-                .map(|k| sample(7.0 * k % 80.0, 30.0, 11.0 * k % 80.0, 30.0 + 180.0 * (k % 2.0)))
+                .map(|k| {
+                    sample(
+                        7.0 * k % 80.0,
+                        30.0,
+                        11.0 * k % 80.0,
+                        30.0 + 180.0 * (k % 2.0),
+                    )
+                })
                 .collect(),
             Some("in the plane of incidence"),
         ),
         (
-            angles().map(|k| sample(7.0 * k % 80.0, 30.0, 11.0 * k % 80.0, 37.0 * k)).collect(),
+            angles()
+                .map(|k| sample(7.0 * k % 80.0, 30.0, 11.0 * k % 80.0, 37.0 * k))
+                .collect(),
             Some("one azimuth of light, 30 degrees"),
         ),
         (
-            angles().map(|k| sample(7.0 * k % 80.0, 37.0 * k, 11.0 * k % 80.0, 0.0)).collect(),
+            angles()
+                .map(|k| sample(7.0 * k % 80.0, 37.0 * k, 11.0 * k % 80.0, 0.0))
+                .collect(),
             Some("one azimuth of view, 0 degrees"),
         ),
         (
-            angles().map(|k| sample(7.0 * k % 80.0, 37.0 * k, 11.0 * k % 80.0, 59.0 * k)).collect(),
+            angles()
+                .map(|k| sample(7.0 * k % 80.0, 37.0 * k, 11.0 * k % 80.0, 59.0 * k))
+                .collect(),
             None,
         ),
     ];
