@@ -92,6 +92,7 @@ fn case(came_in: &str, rows: &[Row], arguments: &[&str], code: i32, words: &[&st
     case
 }
 
+// long: a table, one case after the other.
 #[test]
 fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() {
     let good = good();

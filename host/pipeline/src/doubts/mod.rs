@@ -26,14 +26,15 @@ use gonia_rig::{Oddities, Oddity, Remark};
 /// Angles in radians, or values that are mostly not positive.
 pub(crate) fn of_samples(samples: &[Sample]) -> Result<Vec<Remark>, Error> {
     let mut remarks: Vec<Remark> = angles::in_radians(samples)?.into_iter().collect();
-    remarks.extend(surface::remark(samples));
     remarks.extend(values::not_positive(samples)?);
     Ok(remarks)
 }
 
 /// What is to be said of them once they are in bins.
 pub(crate) fn of_bins(samples: &[Sample], bins: &Bins) -> Vec<Remark> {
+    // A cosine in the values makes them less smooth in any reading of the angles.
     let mut remarks: Vec<Remark> = reciprocity::cosine_factor(samples, bins)
+        .or_else(|| surface::remark(samples))
         .into_iter()
         .collect();
     remarks.extend(values::noisy(bins));

@@ -2,9 +2,10 @@
 //!
 //! Values are smooth over the right directions, and a highlight depends on little but the half vector. With
 //! the angles' complements what is one direction, the pole, is torn into a ring, and a ring is drawn together. So
-//! of both readings that one is right in which values that are near in some respect differ less: near in
-//! direction, in the angle from the mirror direction, in that of the half vector, in that between light and view, or
-//! in the sum of the polar angles.
+//! of both readings that one is right in which values that are near in some respect differ less: in the angle
+//! from the mirror direction, in that of the half vector, in that between light and view, in either polar angle or in
+//! their sum. Where directions lie so densely that neighbours in all four angles speak for the first reading, as
+//! they do of any material, these decide.
 //!
 //! Reciprocity cannot tell the two readings apart, nor can the place of a highlight, which stays in the mirror
 //! direction. Where values hardly change there is nothing to see, and nothing is said.
@@ -23,6 +24,8 @@ const AMONG: usize = 10_000;
 const SURE: f64 = 6.0;
 /// Share of the neighbours' disagreement that may be left in the other reading.
 const LEFT_MAX: f64 = 0.75;
+/// Neighbours in all four angles may disagree by so much more in the other reading, by chance.
+const NEAR_MAX: f64 = 1.02;
 /// Natural logarithms: more counts as this, so that outliers do not decide.
 const DIFFERENCE_MAX: f64 = 1.0;
 /// Fewer samples than this say nothing.
@@ -43,15 +46,19 @@ pub(super) fn remark(samples: &[Sample]) -> Option<Remark> {
     let logs: Vec<f64> = positive.iter().map(|s| brightness(s).ln()).collect();
     let step = positive.len().div_ceil(ASKED);
     let asked: Vec<usize> = (0..positive.len()).step_by(step).collect();
-    let [read, other] = [false, true].map(|complement| {
+    let [(read, near_read), (other, near_other)] = [false, true].map(|complement| {
         let places: Vec<Place> = positive.iter().map(|s| place(s, complement)).collect();
-        least_disagreement(&places, &logs, &asked)
+        (
+            least_disagreement(&places, &logs, &asked),
+            mean(&in_direction(&places, &logs, &asked)).0,
+        )
     });
     let gains: Vec<f64> = read.iter().zip(&other).map(|(r, o)| r - o).collect();
     let (gain, error) = mean(&gains);
     let (as_read, _) = mean(&read);
     let as_other = as_read - gain;
-    (gain > SURE * error && as_other < LEFT_MAX * as_read).then(|| {
+    let denied = near_other > NEAR_MAX * near_read;
+    (gain > SURE * error && as_other < LEFT_MAX * as_read && !denied).then(|| {
         Remark::new(
             SAMPLES,
             format_args!(
@@ -78,17 +85,17 @@ fn place(s: &Sample, complement: bool) -> Place {
 /// How far the logarithms that are asked for are from those of their neighbours, in that respect in which they
 /// are nearest.
 fn least_disagreement(places: &[Place], logs: &[f64], asked: &[usize]) -> Vec<f64> {
-    let respects: [fn(&Place) -> f64; 4] = [
+    let respects: [fn(&Place) -> f64; 6] = [
         |[l, v]| (l[0] + v[0]).hypot(l[1] + v[1]).hypot(l[2] - v[2]),
         |[l, v]| (l[0] + v[0]).hypot(l[1] + v[1]) / (2.0 + 2.0 * dot(*l, *v)).max(1e-9).sqrt(),
         |[l, v]| dot(*l, *v),
         |[l, v]| l[2].min(1.0).acos() + v[2].min(1.0).acos(),
+        |[l, _]| l[2],
+        |[_, v]| v[2],
     ];
-    let by_direction = in_direction(places, logs, asked);
     respects
         .map(|respect| in_one_respect(places, logs, asked, respect))
         .into_iter()
-        .chain([by_direction])
         .min_by(|a, b| mean(a).0.total_cmp(&mean(b).0))
         .unwrap_or_default()
 }
