@@ -92,6 +92,3 @@ fn some(samples: &[Sample], at_most: usize) -> Vec<&Sample> {
     let step = samples.len().div_ceil(at_most).max(1);
     samples.iter().step_by(step).collect()
 }
-
-#[cfg(test)]
-mod tests;

@@ -24,8 +24,8 @@ const AMONG: usize = 10_000;
 const SURE: f64 = 6.0;
 /// Share of the neighbours' disagreement that may be left in the other reading.
 const LEFT_MAX: f64 = 0.75;
-/// Neighbours in all four angles may disagree by so much more in the other reading, by chance.
-const NEAR_MAX: f64 = 1.02;
+/// Neighbours in all four angles that speak for the first reading by so many standard errors decide.
+const DENIED: f64 = 3.0;
 /// Natural logarithms: more counts as this, so that outliers do not decide.
 const DIFFERENCE_MAX: f64 = 1.0;
 /// Fewer samples than this say nothing.
@@ -50,14 +50,14 @@ pub(super) fn remark(samples: &[Sample]) -> Option<Remark> {
         let places: Vec<Place> = positive.iter().map(|s| place(s, complement)).collect();
         (
             least_disagreement(&places, &logs, &asked),
-            mean(&in_direction(&places, &logs, &asked)).0,
+            in_direction(&places, &logs, &asked),
         )
     });
-    let gains: Vec<f64> = read.iter().zip(&other).map(|(r, o)| r - o).collect();
-    let (gain, error) = mean(&gains);
+    let (near_gain, near_error) = gain(&near_read, &near_other);
+    let (gain, error) = gain(&read, &other);
     let (as_read, _) = mean(&read);
     let as_other = as_read - gain;
-    let denied = near_other > NEAR_MAX * near_read;
+    let denied = near_gain < -DENIED * near_error;
     (gain > SURE * error && as_other < LEFT_MAX * as_read && !denied).then(|| {
         Remark::new(
             SAMPLES,
@@ -142,6 +142,12 @@ fn in_direction(places: &[Place], logs: &[f64], asked: &[usize]) -> Vec<f64> {
 
 fn difference(a: f64, b: f64) -> f64 {
     (a - b).abs().min(DIFFERENCE_MAX)
+}
+
+/// By how much two readings differ in the mean, and the standard error of that.
+fn gain(read: &[f64], other: &[f64]) -> (f64, f64) {
+    let gains: Vec<f64> = read.iter().zip(other).map(|(r, o)| r - o).collect();
+    mean(&gains)
 }
 
 /// Mean and its standard error.
