@@ -199,7 +199,7 @@ fn angles_from_the_surface_are_seen_where_the_material_shows_them() {
     }
     println!("{seen:?}");
     assert!(
-        seen.iter().any(|(name, _)| *name == "brushed-metal"),
+        seen.iter().any(|(name, _)| *name == "white"),
         "{seen:?}"
     );
 }
@@ -222,7 +222,7 @@ fn values_that_are_mostly_below_zero_are_refused_and_some_are_counted() {
     samples[0].rgb = [0.1; 3];
     let said = all_said(&samples).unwrap_err().to_string();
     assert!(
-        said.contains("360 of 400 samples are not above zero"),
+        said.contains("399 of 400 samples are not above zero"),
         "{said}"
     );
 }
@@ -244,7 +244,7 @@ fn slices_of_the_four_angles_are_named() {
         ),
         (
             angles()
-                .map(|k| sample(k, 6.0 * k, 0.5, 90.0 * k))
+                .map(|k| sample(k, 6.0 * k, 0.2, 90.0 * k))
                 .collect(),
             Some("one direction of view"),
         ),

@@ -33,12 +33,10 @@ pub(crate) fn of_samples(samples: &[Sample]) -> Result<Vec<Remark>, Error> {
 /// What is to be said of them once they are in bins.
 pub(crate) fn of_bins(samples: &[Sample], bins: &Bins) -> Vec<Remark> {
     // A cosine in the values makes them less smooth in any reading of the angles.
-    let mut remarks: Vec<Remark> = reciprocity::cosine_factor(samples, bins)
+    reciprocity::cosine_factor(samples, bins)
         .or_else(|| surface::remark(samples))
         .into_iter()
-        .collect();
-    remarks.extend(values::noisy(bins));
-    remarks
+        .collect()
 }
 
 /// Where a remark on samples stands.

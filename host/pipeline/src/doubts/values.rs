@@ -1,8 +1,8 @@
-//! Doubts about values: at or below zero, or lost in noise.
+//! Doubts about values: at or below zero.
 
 use super::SAMPLES;
 use crate::Error;
-use gonia_brdf::{Bins, Sample};
+use gonia_brdf::Sample;
 use gonia_rig::Remark;
 use rayon::prelude::*;
 
@@ -10,8 +10,6 @@ use rayon::prelude::*;
 const MOST: f64 = 0.6;
 /// A few values below zero are the noise of dark directions; above this share they are remarked on.
 const SOME: f64 = 0.01;
-/// Noise of one sample, relative to its value, that is remarked on.
-const NOISE_MAX: f32 = 0.5;
 
 /// Counts values at or below zero, by channel.
 ///
@@ -45,19 +43,4 @@ pub(super) fn not_positive(samples: &[Sample]) -> Result<Option<Remark>, Error> 
         format_args!("{counted}: noise as large as the signal, a dark level too high, or a sign"),
         "check the sign and the dark level, or average more exposures",
     )))
-}
-
-/// Noise of single samples that comes near their values.
-pub(super) fn noisy(bins: &Bins) -> Option<Remark> {
-    let noise = bins.noise_variance()?.sqrt();
-    (noise > NOISE_MAX).then(|| {
-        Remark::new(
-            SAMPLES,
-            format_args!(
-                "single samples of one direction scatter by {:.0} % of their value",
-                100.0 * noise
-            ),
-            "measure with more light or longer exposures, or average more samples",
-        )
-    })
 }
