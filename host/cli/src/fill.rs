@@ -5,12 +5,14 @@ use crate::remarks;
 use crate::scale::{self, ScaleArgument};
 use crate::table;
 use anyhow::{Context, Result, bail};
-use gonia_brdf::interpolate::{ErrorBars, Origin, Preset};
+use gonia_brdf::interpolate::{OriginCounts, Preset};
 use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense, write_error_bars};
 use gonia_formats::samples::read_samples_of_all;
 use gonia_formats::{check_output, checksum};
 use gonia_pipeline::provenance::Provenance;
-use gonia_pipeline::{FillCounts, FillMethod, FillOptions, Filled, fill, fill_to_file};
+use gonia_pipeline::{
+    DirectionalAlbedo, FillCounts, FillMethod, FillOptions, Filled, fill, fill_to_file,
+};
 use gonia_rig::{SampleSet, Scale};
 use std::path::{Path, PathBuf};
 
@@ -127,10 +129,12 @@ impl Fill {
                 fill(samples, &options, &progress.watch()).with_context(|| names.clone())?;
             self.write(filled, facts, &progress)?
         } else {
-            let (counts, settings) =
-                fill_to_file(samples, &options, &self.output, &facts, &progress.watch())
-                    .with_context(|| names.clone())?;
-            describe(&counts, &settings)
+            let filled = fill_to_file(samples, &options, &self.output, &facts, &progress.watch())
+                .with_context(|| names.clone())?;
+            remarks::print(&filled.remarks);
+            let mut rows = describe(&filled.counts, &filled.settings);
+            rows.extend(origins(&filled.origins));
+            rows
         };
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));
         rows.push(scale_row);
@@ -149,7 +153,10 @@ impl Fill {
         facts: Provenance,
         progress: &Progress,
     ) -> Result<Vec<(String, String)>> {
+        remarks::print(&filled.remarks);
         let mut rows = describe(&filled.counts, &filled.settings);
+        rows.extend(origins(&filled.origins));
+        rows.push(albedo(&filled.albedo, filled.dense.scale));
         if let FillMethod::Cellwise(_) = self.method {
             rows.extend([
                 (
@@ -174,7 +181,6 @@ impl Fill {
             write_dense(&self.output, file).map(drop)
         })?;
         if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
-            rows.extend(origins(&bars));
             progress.stage("writing the error bars", |_| {
                 write_error_bars(path, grid, bars, scale, &error_facts)
             })?;
@@ -201,16 +207,36 @@ fn describe(counts: &FillCounts, settings: &str) -> Vec<(String, String)> {
 }
 
 /// Where the cells' values come from.
-fn origins(bars: &ErrorBars) -> impl Iterator<Item = (String, String)> {
+fn origins(counts: &OriginCounts) -> [(String, String); 4] {
+    let guessed = 100.0 * counts.extrapolated_share();
+    let extrapolated = table::count(counts.extrapolated);
     [
-        ("cells measured", Origin::Measured),
-        ("cells by reciprocity", Origin::Reciprocal),
-        ("cells interpolated", Origin::Interpolated),
-        ("cells extrapolated", Origin::Extrapolated),
+        ("cells measured", table::count(counts.measured)),
+        ("cells by reciprocity", table::count(counts.reciprocal)),
+        ("cells interpolated", table::count(counts.interpolated)),
+        (
+            "cells extrapolated",
+            format!("{extrapolated} ({guessed:.1} %)"),
+        ),
     ]
-    .map(|(name, origin)| {
-        let count = bars.origin.iter().filter(|o| **o == origin as u8).count();
-        (name.to_owned(), table::count(count as u64))
-    })
-    .into_iter()
+    .map(|(name, text)| (name.to_owned(), text))
+}
+
+/// The share of the light that is reflected, in green at three polar angles, and the highest of all.
+fn albedo(albedo: &DirectionalAlbedo, scale: Scale) -> (String, String) {
+    let [at_0, at_30, at_60] = [0.0, 30.0, 60.0].map(|theta| albedo.at(theta)[1]);
+    let relative = match scale {
+        Scale::Absolute => "",
+        Scale::Relative => " (relative)",
+    };
+    (
+        format!("directional albedo{relative}"),
+        format!(
+            "{at_0:.3}, {at_30:.3}, {at_60:.3} (G at theta_i 0, 30, 60); highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
+            albedo.highest,
+            albedo.channel_name(),
+            albedo.theta_i_deg,
+            albedo.phi_i_deg
+        ),
+    )
 }

@@ -46,6 +46,7 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
         ..FillOptions::with_step_deg(STEP_DEG)
     };
     let filled = fill(set, &options, &progress.watch())?;
+    remarks::print(&filled.remarks);
     let bars = filled.errors.context("the fill gave no error bars")?;
     let (grid, relative) = (filled.dense.brdf.grid(), bars.relative(&filled.dense.brdf));
     let highest = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;

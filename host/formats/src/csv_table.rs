@@ -126,8 +126,12 @@ impl CsvTable {
         problem: impl std::fmt::Display,
         remedy: impl std::fmt::Display,
     ) -> FileError {
-        let line = self.record.position().map_or(0, Position::line);
-        FileError::new(&self.path, problem, remedy).at(format_args!("line {line}"))
+        FileError::new(&self.path, problem, remedy).at(format_args!("line {}", self.line()))
+    }
+
+    /// The line of the current row.
+    pub fn line(&self) -> u64 {
+        self.record.position().map_or(0, Position::line)
     }
 }
 

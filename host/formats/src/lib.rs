@@ -44,6 +44,7 @@ mod npy;
 mod npy_literal;
 mod npy_samples;
 mod npy_type;
+mod odd_samples;
 pub mod photo;
 pub mod plan_csv;
 pub mod raw_frame;

@@ -8,7 +8,7 @@ pub use crate::format::{SampleNote, SamplesRead};
 
 use crate::format::{Content, ReadSamples, SampleFormat, WriteSamples};
 use crate::sample_rows::LAST_FRAME;
-use crate::{FileError, sample_note, samples_csv, table};
+use crate::{FileError, odd_samples, sample_note, samples_csv, table};
 use gonia_brdf::Sample;
 use gonia_rig::Scale;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,13 @@ const TEXT_ENDINGS: [&str; 2] = ["txt", "tsv"];
 ///
 /// # Errors
 /// One line naming the file and, where there is one, the row (counted from 0 in arrays) or line: of no
-/// known format, columns that are missing or that could be more than one thing, a value that is not
-/// finite, a polar angle outside 0° ≤ θ ≤ 90°, or a frame number that is none or that its type does
-/// not tell from the next one.
+/// known format, columns that are missing or that could be more than one thing, a frame number that is
+/// none or that its type does not tell from the next one, or more than half of the samples below the
+/// horizon or not finite. Fewer of these are left out, negative polar angles are turned, and the
+/// remarks say how many.
 pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
     let mut read = (reader_of(path)?)(path)?;
+    odd_samples::sort_out(path, &mut read)?;
     sample_note::add_to(&mut read, path)?;
     Ok(read)
 }

@@ -42,9 +42,15 @@ fn is_header(names: &[String]) -> bool {
     SampleColumns::by_names(names).is_ok()
 }
 
+/// A table of text that may hold samples.
+pub(super) fn table(path: &Path) -> Result<TextTable, FileError> {
+    let text = read_text(path)?;
+    Ok(TextTable::new(path, text, LEAST_COLUMNS, &is_header))
+}
+
 /// Reads samples from a table of text.
 pub(super) fn read(path: &Path) -> Result<SamplesRead, FileError> {
-    let table = TextTable::new(path, read_text(path)?, LEAST_COLUMNS, &is_header);
+    let table = table(path)?;
     let (columns, assumed) = columns_of(path, &table)?;
     let mut rows = table.rows();
     let mut samples = Vec::new();
@@ -551,7 +557,7 @@ mod tests {
         );
         let error = read("1,2,3,100,20,30,40\n").unwrap_err().to_string();
         assert!(
-            error.contains("s.csv, line 2: theta_i 100 is not a polar angle"),
+            error.contains("s.csv, line 2: 1 of 1 samples lie below the horizon"),
             "{error}"
         );
     }

@@ -34,6 +34,14 @@ pub enum Error {
         /// What is possible.
         remedy: String,
     },
+    /// The samples contradict what they are taken for.
+    #[error("{what}; {remedy}")]
+    Contradicted {
+        /// The evidence.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The samples cannot be interpolated.
     #[error(transparent)]
     Fill(#[from] FillError),

@@ -1,15 +1,17 @@
 //! Samples → bins → dense BRDF.
 
 use crate::Error;
+use crate::doubts::{self, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{
-    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, Preset,
+    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, OriginCounts,
+    Preset,
 };
-use gonia_brdf::{Bins, DenseBrdf, Grid};
+use gonia_brdf::{Bin, Bins, DenseBrdf, Grid};
 use gonia_formats::dense::write_dense_by_rows;
-use gonia_rig::{DenseFile, SampleSet};
+use gonia_rig::{DenseFile, Remark, SampleSet, keep_sound};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -179,7 +181,7 @@ impl FillOptions {
 pub struct FillCounts {
     /// Samples that fell into a bin.
     pub binned: usize,
-    /// Samples outside the grid.
+    /// Samples outside the grid, or left out.
     pub outside: usize,
     /// Bins that hold a sample.
     pub bins: usize,
@@ -202,13 +204,35 @@ pub struct Filled {
     pub counts: FillCounts,
     /// The method's settings, as chosen for the material, for people.
     pub settings: String,
+    /// Where the cells' values come from.
+    pub origins: OriginCounts,
+    /// The directional albedo, its highest within the measured polar angles.
+    pub albedo: DirectionalAlbedo,
+    /// What in the samples and in the result speaks against what they are taken for.
+    pub remarks: Vec<Remark>,
+}
+
+/// What became of samples whose dense BRDF was written row by row.
+#[derive(Clone, Debug)]
+pub struct FilledFile {
+    /// What became of the samples.
+    pub counts: FillCounts,
+    /// The method's settings, as chosen for the material, for people.
+    pub settings: String,
+    /// Where the cells' values come from.
+    pub origins: OriginCounts,
+    /// What in the samples speaks against what they are taken for.
+    pub remarks: Vec<Remark>,
 }
 
 /// Bins samples, chooses the settings that suit the material, and interpolates every cell of the
-/// grid. The result has the samples' scale. The grid must fit memory.
+/// grid. The result has the samples' scale. The grid must fit memory. Samples below the horizon or not
+/// finite are left out, negative polar angles are turned ([`keep_sound`]); the remarks say so, and what else
+/// speaks against the samples.
 ///
 /// # Errors
-/// Options that are not possible, too few bins, or too few frames for standard errors.
+/// Options that are not possible, samples that contradict what they are taken for, too few bins, or too few
+/// frames for standard errors.
 pub fn fill(
     samples: SampleSet,
     options: &FillOptions,
@@ -235,6 +259,9 @@ pub fn fill(
             (filled.dense, None, settings.to_string(), counts)
         }
     };
+    let albedo = DirectionalAlbedo::of(&brdf, binned.highest_deg());
+    let mut remarks = binned.remarks;
+    remarks.extend(doubts::remark_on_energy(&albedo, scale));
     Ok(Filled {
         dense: DenseFile {
             brdf,
@@ -245,11 +272,14 @@ pub fn fill(
         cells: binned.bins.bins().iter().map(|b| b.cell).collect(),
         counts,
         settings,
+        origins: binned.origins,
+        albedo,
+        remarks,
     })
 }
 
 /// Fills a grid that does not fit memory, and writes it row by row. `facts` are added to the file's
-/// provenance. Gives what became of the samples, and the settings.
+/// provenance.
 ///
 /// # Errors
 /// As [`fill`], and when the file cannot be written.
@@ -259,7 +289,7 @@ pub fn fill_to_file(
     path: &Path,
     facts: &Provenance,
     progress: &Progress<'_>,
-) -> Result<(FillCounts, String), Error> {
+) -> Result<FilledFile, Error> {
     let (grid, base) = options.check()?;
     let scale = samples.scale;
     let binned = Binned::new(samples, grid, progress)?;
@@ -273,7 +303,12 @@ pub fn fill_to_file(
     step(progress, Step::InterpolatingAndWriting, |share| {
         write_dense_by_rows(path, grid, &rows, scale, &provenance, share).map_err(Error::from)
     })?;
-    Ok((binned.counts(), settings.to_string()))
+    Ok(FilledFile {
+        counts: binned.counts(),
+        settings: settings.to_string(),
+        origins: binned.origins,
+        remarks: binned.remarks,
+    })
 }
 
 /// Bins, interpolated block by block.
@@ -341,29 +376,51 @@ fn chosen(
     })
 }
 
-/// Samples in their bins.
+/// Samples in their bins, and what is to be said of them.
 struct Binned {
     bins: Bins,
     samples: usize,
+    origins: OriginCounts,
+    remarks: Vec<Remark>,
 }
 
 impl Binned {
-    fn new(samples: SampleSet, grid: Grid, progress: &Progress<'_>) -> Result<Self, Error> {
+    fn new(mut samples: SampleSet, grid: Grid, progress: &Progress<'_>) -> Result<Self, Error> {
         let count = samples.samples.len();
+        let odd = keep_sound(&mut samples.samples);
+        let samples = samples.samples;
+        let mut remarks = doubts::of_oddities(&odd);
+        remarks.extend(doubts::of_samples(&samples)?);
         let bins = step(progress, Step::Binning, |_| {
-            Ok::<_, Error>(Bins::new(grid, &samples.samples))
+            Ok::<_, Error>(Bins::new(grid, &samples))
         })?;
+        remarks.extend(doubts::of_bins(&samples, &bins));
+        let origins = OriginCounts::of(&bins);
+        remarks.extend(doubts::remark_on_layout(&samples, &origins));
         Ok(Self {
             bins,
             samples: count,
+            origins,
+            remarks,
         })
     }
 
+    /// The largest polar angle of light, or by reciprocity of view, that was measured.
+    fn highest_deg(&self) -> f64 {
+        let grid = self.bins.grid();
+        let ring = |bin: &Bin| {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            light.max(view) / grid.n_phi()
+        };
+        let highest = self.bins.bins().iter().map(ring).max().unwrap_or(0);
+        highest as f64 * grid.step_deg()
+    }
+
     fn counts(&self) -> FillCounts {
-        let outside = self.bins.outside();
+        let binned: usize = self.bins.bins().iter().map(|bin| bin.count as usize).sum();
         FillCounts {
-            binned: self.samples - outside,
-            outside,
+            binned,
+            outside: self.samples - binned,
             bins: self.bins.bins().len(),
             failed: 0,
             raised: 0,

@@ -28,6 +28,7 @@ pub mod baselines;
 pub mod bracket;
 pub mod chart;
 pub mod compare;
+mod doubts;
 mod error;
 mod fill;
 pub mod fit;
@@ -37,9 +38,11 @@ pub mod provenance;
 mod samples;
 
 pub use compare::{CompareError, Options, Side, Table, compare};
+pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
-    FillCounts, FillMethod, FillOptions, Filled, FilledBins, fill, fill_bins, fill_to_file,
+    FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins,
+    fill_to_file,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

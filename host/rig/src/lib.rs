@@ -8,6 +8,7 @@
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
+//! | [`keep_sound`], [`Oddities`] | samples that cannot stand as they came |
 //! | [`Remark`] | what is said of data that were used all the same |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
 
@@ -28,6 +29,7 @@ mod rig_error;
 mod sample_set;
 mod scale;
 mod sensor;
+mod sound_samples;
 pub mod stratum;
 
 pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
@@ -47,4 +49,5 @@ pub use rig_error::RigError;
 pub use sample_set::SampleSet;
 pub use scale::Scale;
 pub use sensor::{Bayer, Sensor};
+pub use sound_samples::{Oddities, Oddity, keep_sound};
 pub use stratum::Stratum;

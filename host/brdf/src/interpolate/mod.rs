@@ -21,6 +21,7 @@ pub mod exponential;
 pub mod fill;
 pub mod from_corners;
 pub mod hierarchy;
+mod low_signal;
 pub mod origin;
 pub mod patches;
 pub(crate) mod planes;
@@ -33,7 +34,7 @@ pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};
 pub use fill::{FillError, fill, fill_with_errors};
-pub use origin::{Origin, origins};
+pub use origin::{Origin, OriginCounts, origins};
 pub use select::{Candidate, Selection, select};
 
 /// How to interpolate.

@@ -21,6 +21,55 @@ pub enum Origin {
     Extrapolated = 3,
 }
 
+/// How many cells have their value from where.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OriginCounts {
+    /// [`Origin::Measured`].
+    pub measured: u64,
+    /// [`Origin::Reciprocal`].
+    pub reciprocal: u64,
+    /// [`Origin::Interpolated`].
+    pub interpolated: u64,
+    /// [`Origin::Extrapolated`].
+    pub extrapolated: u64,
+}
+
+impl OriginCounts {
+    /// Counts what [`origins`] would give, without a visit to every cell.
+    pub fn of(bins: &Bins) -> Self {
+        let (grid, reach) = (bins.grid(), Reach::new(bins));
+        let interpolated = reach.interpolated();
+        let all = bins.bins();
+        // Each bin's cell, and its reciprocal one where no bin is, come off what they would be else.
+        let (reciprocal, known_interpolated) = all
+            .par_iter()
+            .map(|bin| {
+                let (light, view) = grid.light_and_view(bin.cell as usize);
+                let mirrored = grid.cell(view, light) as u32;
+                let alone = all.binary_search_by_key(&mirrored, |b| b.cell).is_err();
+                // Both have the same origin: what is near and within reach is so for either order.
+                let within = reach.origin(light, view) == Origin::Interpolated;
+                let cells = 1 + u64::from(alone);
+                (u64::from(alone), cells * u64::from(within))
+            })
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let measured = all.len() as u64;
+        let interpolated = interpolated - known_interpolated;
+        Self {
+            measured,
+            reciprocal,
+            interpolated,
+            extrapolated: grid.n_cells() as u64 - measured - reciprocal - interpolated,
+        }
+    }
+
+    /// Cells that are extrapolated, over all, 0 ..= 1.
+    pub fn extrapolated_share(&self) -> f64 {
+        let all = self.measured + self.reciprocal + self.interpolated + self.extrapolated;
+        self.extrapolated as f64 / all.max(1) as f64
+    }
+}
+
 /// Which cells are beyond all that was measured: beyond the pairs of polar angles (for each of one
 /// direction, the largest of the other), or in a gap of the directions.
 struct Reach {
@@ -54,6 +103,39 @@ impl Reach {
         }
         let near = measured.map(|measured| near(grid, &measured));
         Self { n_phi, rows, near }
+    }
+
+    /// Cells within reach, those of bins among them.
+    fn interpolated(&self) -> u64 {
+        let [lights, views] = &self.near;
+        // By row, how many directions are near measured lights, views, and both.
+        let rows: Vec<[u64; 3]> = lights
+            .chunks(self.n_phi)
+            .zip(views.chunks(self.n_phi))
+            .map(|(lights, views)| {
+                let count = |near: &dyn Fn(bool, bool) -> bool| {
+                    let both = lights.iter().zip(views);
+                    both.filter(|(l, v)| near(**l, **v)).count() as u64
+                };
+                [count(&|l, _| l), count(&|_, v| v), count(&|l, v| l && v)]
+            })
+            .collect();
+        (0..lights.len())
+            .map(|light| {
+                let rows = &rows[..self.rows[light / self.n_phi].min(rows.len())];
+                let (as_light, as_view) = (lights[light], views[light]);
+                rows.iter()
+                    .map(
+                        |[near_lights, near_views, both]| match (as_light, as_view) {
+                            (true, true) => near_lights + near_views - both,
+                            (true, false) => *near_views,
+                            (false, true) => *near_lights,
+                            (false, false) => 0,
+                        },
+                    )
+                    .sum::<u64>()
+            })
+            .sum()
     }
 
     fn origin(&self, light: usize, view: usize) -> Origin {
@@ -103,4 +185,40 @@ pub fn origins(bins: &Bins) -> Vec<u8> {
         origins[bin.cell as usize] = Origin::Measured as u8;
     }
     origins
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::direction::Direction;
+    use crate::sample::Sample;
+
+    #[test]
+    fn counts_are_those_of_the_cells() {
+        let grid = Grid::with_step_deg(10.0).unwrap();
+        // In plane; one azimuth of incidence; all over.
+        for (light_turn, view_turn) in [(0.0, 180.0), (0.0, 37.0), (71.0, 37.0)] {
+            let samples: Vec<Sample> = (0..60)
+                .map(|k| {
+                    let k = f64::from(k);
+                    let light = Direction::from_deg(k * 7.0 % 70.0, k * light_turn);
+                    let view = Direction::from_deg(k * 13.0 % 84.0, k * view_turn);
+                    Sample::new(light, view, [1.0; 3])
+                })
+                .collect();
+            let bins = Bins::new(grid, &samples);
+            let cells = origins(&bins);
+            let count =
+                |origin: Origin| cells.iter().filter(|o| **o == origin as u8).count() as u64;
+            let counted = OriginCounts {
+                measured: count(Origin::Measured),
+                reciprocal: count(Origin::Reciprocal),
+                interpolated: count(Origin::Interpolated),
+                extrapolated: count(Origin::Extrapolated),
+            };
+            assert_eq!(OriginCounts::of(&bins), counted);
+            assert!(counted.reciprocal > 0 && counted.extrapolated > 0);
+        }
+    }
 }

@@ -6,6 +6,7 @@ mod summary;
 
 use crate::account;
 use crate::progress::Progress;
+use crate::remarks;
 use anyhow::{Context, Result, bail};
 use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::travelling;
@@ -164,6 +165,7 @@ impl Run {
             &options,
             &self.progress.watch(),
         )?;
+        remarks::print(&filled.remarks);
         let mut file = filled.dense;
         file.provenance.extend(self.facts());
         summary.provenance = file.provenance.clone();

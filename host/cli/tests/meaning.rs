@@ -1,0 +1,278 @@
+//! Samples that are not what they are taken for: what `gonia fill` says of them.
+#![allow(clippy::unwrap_used)]
+
+#[path = "common/cases.rs"]
+mod cases;
+mod common;
+
+use cases::{Case, document};
+use common::{gonia, text};
+use gonia_brdf::Elementary;
+use std::fmt::Write as _;
+use std::fs;
+
+/// θi, φi, θv, φv in degrees, and a value.
+type Row = [f64; 5];
+
+/// Directions all over two hemispheres, of a highlight over a Lambertian base.
+fn good() -> Vec<Row> {
+    let part = |k: usize, factor: f64| (k as f64 * factor).fract();
+    (1..=400)
+        .map(|k| {
+            let theta = |u: f64| (1.0 - 0.9 * u).arc_cosine().to_degrees();
+            let angles = [
+                theta(part(k, 0.819_173)),
+                360.0 * part(k, 0.671_044),
+                theta(part(k, 0.549_700)),
+                360.0 * part(k, 0.450_300),
+            ];
+            with_value(angles)
+        })
+        .collect()
+}
+
+fn with_value([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> Row {
+    let vector = |theta: f64, phi: f64| {
+        let (theta, phi) = (theta.to_radians(), phi.to_radians());
+        [
+            theta.sine() * phi.cosine(),
+            theta.sine() * phi.sine(),
+            theta.cosine(),
+        ]
+    };
+    let (l, v) = (vector(theta_i, phi_i), vector(theta_v, phi_v));
+    let half = [l[0] + v[0], l[1] + v[1], l[2] + v[2]];
+    let cosine = half[2] / half.iter().map(|x| x * x).sum::<f64>().sqrt();
+    [theta_i, phi_i, theta_v, phi_v, 0.1 + 0.5 * cosine.powi(80)]
+}
+
+/// The same rows, each changed by its number.
+fn changed(rows: &[Row], change: impl Fn(usize, &mut Row)) -> Vec<Row> {
+    let mut rows = rows.to_vec();
+    rows.iter_mut()
+        .enumerate()
+        .for_each(|(k, row)| change(k, row));
+    rows
+}
+
+/// Fills rows, with more arguments, and holds what is said against `words`.
+fn case(came_in: &str, rows: &[Row], arguments: &[&str], code: i32, words: &[&str]) -> Case {
+    let dir = tempfile::tempdir().unwrap();
+    let (samples, dense) = (dir.path().join("s.csv"), dir.path().join("d.exr"));
+    let mut csv = String::from("theta_i,phi_i,theta_v,phi_v,r,g,b\n");
+    for [theta_i, phi_i, theta_v, phi_v, value] in rows {
+        let values = format!("{value:.6},{value:.6},{value:.6}");
+        writeln!(
+            csv,
+            "{theta_i:.4},{phi_i:.4},{theta_v:.4},{phi_v:.4},{values}"
+        )
+        .unwrap();
+    }
+    fs::write(&samples, csv).unwrap();
+    let mut all = vec!["fill", text(&samples), "-o", text(&dense), "--step", "10"];
+    all.extend(["--preset", "preview"]);
+    all.extend(arguments);
+    let output = gonia(&all, "");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let case = Case::new(came_in, &output, dir.path(), &[]);
+    assert_eq!(case.code(), code, "{came_in}: {}", case.said());
+    assert_eq!(dense.exists(), code == 0, "{came_in}");
+    for word in words {
+        assert!(case.said().contains(word), "{came_in}: {}", case.said());
+    }
+    assert!(
+        !words.is_empty() || case.said().is_empty(),
+        "{came_in}: {}",
+        case.said()
+    );
+    if code == 0 {
+        for row in ["cells extrapolated", "directional albedo"] {
+            assert!(printed.contains(row), "{came_in}: {printed}");
+        }
+    }
+    case
+}
+
+// long: a table, one case after the other.
+#[test]
+fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() {
+    let good = good();
+    let cases = [
+        case("400 samples of a BRDF", &good, &[], 0, &[]),
+        case(
+            "all angles in radians",
+            &changed(&good, |_, row| {
+                row[..4]
+                    .iter_mut()
+                    .for_each(|angle| *angle = angle.to_radians());
+            }),
+            &[],
+            1,
+            &["they are radians, not degrees", "180/pi"],
+        ),
+        case(
+            "azimuths in radians",
+            &changed(&good, |_, row| {
+                row[1] = row[1].to_radians();
+                row[3] = row[3].to_radians();
+            }),
+            &[],
+            0,
+            &["azimuths none is beyond 6.2", "look like radians"],
+        ),
+        case(
+            "polar angles from the surface",
+            &changed(&good, |_, row| {
+                row[0] = 90.0 - row[0];
+                row[2] = 90.0 - row[2];
+            }),
+            &[],
+            0,
+            &["measured from the surface", "90 - theta"],
+        ),
+        case(
+            "signed polar angles",
+            &changed(&good, |k, row| {
+                if k % 4 == 1 {
+                    row[2] = -row[2];
+                    row[3] = (row[3] + 180.0) % 360.0;
+                }
+            }),
+            &[],
+            0,
+            &["s.csv, line 3: 100 of 400 samples have a negative polar angle"],
+        ),
+        case(
+            "10 of 400 samples below the horizon",
+            &changed(&good, |k, row| {
+                if k % 40 == 0 {
+                    row[2] = 91.0;
+                }
+            }),
+            &[],
+            0,
+            &[
+                "s.csv, line 2: 10 of 400 samples lie below the horizon",
+                "left out",
+            ],
+        ),
+        case(
+            "8 of 400 samples without a value",
+            &changed(&good, |k, row| {
+                if k % 50 == 3 {
+                    row[4] = f64::NAN;
+                }
+            }),
+            &[],
+            0,
+            &[
+                "s.csv, line 5: 8 of 400 samples hold a number that is not finite",
+                "left out",
+            ],
+        ),
+        case(
+            "most samples below the horizon (transmission)",
+            &changed(&good, |k, row| {
+                if k % 4 > 0 {
+                    row[2] = 180.0 - row[2];
+                }
+            }),
+            &[],
+            1,
+            &["300 of 400 samples lie below the horizon"],
+        ),
+        case(
+            "columns of θ and φ exchanged",
+            &changed(&good, |_, row| {
+                row.swap(0, 1);
+                row.swap(2, 3);
+            }),
+            &[],
+            1,
+            &["exchange the columns theta and phi"],
+        ),
+        case(
+            "f·cosθv in place of f",
+            &changed(&good, |_, row| row[4] *= row[2].to_radians().cosine()),
+            &[],
+            0,
+            &["look like f cos(theta_v)", "divide them"],
+        ),
+        case(
+            "f·cosθi in place of f",
+            &changed(&good, |_, row| row[4] *= row[0].to_radians().cosine()),
+            &[],
+            0,
+            &["look like f cos(theta_i)", "divide them"],
+        ),
+        case(
+            "f·cosθi·cosθv in place of f: nothing can tell",
+            &changed(&good, |_, row| {
+                row[4] *= row[0].to_radians().cosine() * row[2].to_radians().cosine();
+            }),
+            &[],
+            0,
+            &[],
+        ),
+        case(
+            "30 % of the values negative",
+            &changed(&good, |k, row| {
+                row[4] *= if k % 10 < 3 { -1.0 } else { 1.0 }
+            }),
+            &[],
+            0,
+            &["120 of 400 samples are not above zero"],
+        ),
+        case(
+            "all values negative",
+            &changed(&good, |_, row| row[4] *= -1.0),
+            &[],
+            1,
+            &["400 of 400 samples are not above zero"],
+        ),
+        case(
+            "one azimuth of light",
+            &changed(&good, |_, row| {
+                let [theta_i, _, theta_v, phi_v, _] = *row;
+                *row = with_value([theta_i, 180.0, theta_v, phi_v]);
+            }),
+            &[],
+            0,
+            &[
+                "one azimuth of light, 180 degrees",
+                "% of the cells are extrapolated",
+            ],
+        ),
+        case(
+            "a scan in the plane of incidence",
+            &changed(&good, |k, row| {
+                let [theta_i, _, theta_v, ..] = *row;
+                *row = with_value([theta_i, 0.0, theta_v, 180.0 * (k % 2) as f64]);
+            }),
+            &[],
+            0,
+            &[
+                "lie in the plane of incidence",
+                "% of the cells are extrapolated",
+            ],
+        ),
+        case(
+            "one direction of light",
+            &changed(&good, |_, row| {
+                let [_, _, theta_v, phi_v, _] = *row;
+                *row = with_value([30.0, 0.0, theta_v, phi_v]);
+            }),
+            &[],
+            0,
+            &["one direction of light"],
+        ),
+        case(
+            "values of π·f said to be absolute",
+            &changed(&good, |_, row| row[4] *= 4.0 * std::f64::consts::PI),
+            &["--scale", "absolute"],
+            0,
+            &["more than it receives"],
+        ),
+    ];
+    document("meaning", &cases);
+}

@@ -1,0 +1,147 @@
+//! Whether a dense BRDF reflects more than it receives.
+
+use gonia_brdf::DenseBrdf;
+use gonia_brdf::Elementary;
+use gonia_rig::{Remark, Scale};
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// The directional albedo ρ(ω) = ∫ f(ω, ωv) cos θv dωv of a dense BRDF: the share of the light from ω that is
+/// reflected, per channel; without a unit where f is in 1/sr.
+///
+/// Beyond the last polar angle of the grid its values count on to the horizon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectionalAlbedo {
+    /// Mean over the azimuths of light, per channel, by the grid's polar angles.
+    pub by_polar_angle: Vec<[f64; 3]>,
+    /// The highest of all directions of light within what was measured.
+    pub highest: f64,
+    /// The channel of the highest: 0 red, 1 green, 2 blue.
+    pub channel: usize,
+    /// Where the highest is: polar angle of the light, degrees.
+    pub theta_i_deg: f64,
+    /// Where the highest is: azimuth of the light, degrees.
+    pub phi_i_deg: f64,
+    /// Step of the polar angles, degrees.
+    pub step_deg: f64,
+}
+
+impl DirectionalAlbedo {
+    /// Sums a BRDF; the highest albedo is looked for up to a polar angle of light.
+    pub fn of(brdf: &DenseBrdf, up_to_deg: f64) -> Self {
+        let grid = brdf.grid();
+        let (n, n_phi, step_deg) = (grid.n_directions(), grid.n_phi(), grid.step_deg());
+        let rings = ring_weights(grid.n_theta(), n_phi, step_deg);
+        let of_light = |light: usize| -> [f64; 3] {
+            [0, 1, 2].map(|c| {
+                let row = &brdf.planes()[c][light * n..(light + 1) * n];
+                row.chunks(n_phi)
+                    .zip(&rings)
+                    .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
+                    .sum()
+            })
+        };
+        let all: Vec<[f64; 3]> = (0..n).into_par_iter().map(of_light).collect();
+        let by_polar_angle = all
+            .chunks(n_phi)
+            .map(|ring| [0, 1, 2].map(|c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64))
+            .collect();
+        let measured = ((up_to_deg / step_deg).round() as usize + 1) * n_phi;
+        let (mut highest, mut channel, mut place) = (f64::NEG_INFINITY, 0, 0);
+        for (light, albedo) in all.iter().enumerate().take(measured) {
+            for c in 0..3 {
+                if albedo[c] > highest {
+                    (highest, channel, place) = (albedo[c], c, light);
+                }
+            }
+        }
+        let light = grid.direction(place);
+        Self {
+            by_polar_angle,
+            highest,
+            channel,
+            theta_i_deg: light.theta_deg(),
+            phi_i_deg: light.phi_deg(),
+            step_deg,
+        }
+    }
+
+    /// The mean over azimuths at a polar angle of light, per channel: of the nearest node.
+    pub fn at(&self, theta_i_deg: f64) -> [f64; 3] {
+        let last = self.by_polar_angle.len().saturating_sub(1);
+        let nearest = ((theta_i_deg / self.step_deg).round() as usize).min(last);
+        self.by_polar_angle
+            .get(nearest)
+            .copied()
+            .unwrap_or([0.0; 3])
+    }
+
+    /// The channel's letter.
+    pub fn channel_name(&self) -> &'static str {
+        ["R", "G", "B"][self.channel.min(2)]
+    }
+}
+
+/// ∫ sin θ cos θ dθ dφ of a node of each polar angle.
+fn ring_weights(n_theta: usize, n_phi: usize, step_deg: f64) -> Vec<f64> {
+    let step = step_deg.to_radians();
+    (0..n_theta)
+        .map(|ring| {
+            let middle = ring as f64 * step;
+            let from = (middle - 0.5 * step).max(0.0);
+            let to = if ring + 1 == n_theta {
+                FRAC_PI_2
+            } else {
+                middle + 0.5 * step
+            };
+            0.5 * (to.sine().powi(2) - from.sine().powi(2)) * TAU / n_phi as f64
+        })
+        .collect()
+}
+
+/// More than all light, by more than the calibration of a white reference may be off.
+const ALBEDO_MAX: f64 = 1.05;
+
+/// What is to be said of a BRDF that is said to be absolute.
+pub(crate) fn remark(albedo: &DirectionalAlbedo, scale: Scale) -> Option<Remark> {
+    let above = scale == Scale::Absolute && albedo.highest > ALBEDO_MAX;
+    above.then(|| {
+        Remark::new(
+            "dense BRDF",
+            format_args!(
+                "it reflects {:.3} of the light from theta_i {:.0}, phi_i {:.0} in channel {}: more than it receives, which no absolute BRDF does",
+                albedo.highest,
+                albedo.theta_i_deg,
+                albedo.phi_i_deg,
+                albedo.channel_name()
+            ),
+            "check the reference's reflectance and a factor of pi or of a cosine in the values, or call them relative",
+        )
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use gonia_brdf::Grid;
+    use gonia_brdf::model::Lambert;
+
+    #[test]
+    fn a_lambertian_surface_reflects_its_albedo_and_more_than_all_light_is_remarked_on() {
+        for step in [2.0, 10.0, 30.0] {
+            let grid = Grid::with_step_deg(step).unwrap();
+            let model = Lambert {
+                albedo: [0.2, 1.2, 0.5],
+            };
+            let albedo = DirectionalAlbedo::of(&DenseBrdf::tabulate(grid, &model), 60.0);
+            for theta in [0.0, 30.0, 90.0] {
+                assert!((albedo.at(theta)[0] - 0.2).abs() < 1e-5, "{albedo:?}");
+            }
+            assert!((albedo.highest - 1.2).abs() < 1e-5 && albedo.channel == 1);
+            assert_eq!(remark(&albedo, Scale::Relative), None);
+            let said = remark(&albedo, Scale::Absolute).unwrap().to_string();
+            assert!(said.contains("1.200 of the light"), "{said}");
+        }
+    }
+}
