@@ -1,7 +1,7 @@
 //! `gonia process`: frames → samples.
 
 use crate::progress::Progress;
-use crate::{account, table};
+use crate::{account, remarks, table};
 use anyhow::{Result, bail};
 use gonia_acquire::session::SessionFolder;
 use gonia_formats::samples::write_samples;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Registers each frame by its fiducial lines, samples it, and calibrates it against the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig. Raw exposures\n(PNG of 8 or 16 bits: mono, Bayer or RGB) have an exposure_s as well; rows of one frame and role are\nmerged by the [sensor] of rig.toml."
+    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear radiance, RGB or grey, of any rig. Raw\nexposures (PNG or TIFF of 8 or 16 bits: mono, Bayer or RGB, linear counts) have an exposure_s as well;\nrows of one frame and role are merged by the [sensor] of rig.toml. A frame that cannot be read is left\nout with a warning."
 )]
 pub struct Process {
     /// The capture folder
@@ -56,6 +56,7 @@ impl Process {
             let processed = samples_of(folder.rig(), &folder, &masks, &progress.watch())?;
             (folder.rig().clone(), processed)
         };
+        remarks::print(&processed.remarks);
         progress.stage("writing samples", |_| {
             write_samples(&output, &processed.samples)
         })?;
