@@ -21,7 +21,7 @@ use gonia_rig::{Bayer, Frame, RawFrame, Reference, Rig, Role, Sensor};
 use gonia_sim::scene::{RawSensor, Scene, SceneGeometry};
 use std::fs::{self, File};
 use std::path::Path;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, Mutex};
 
 const PX: usize = 200;
 const ALBEDO: [f64; 3] = [0.5, 0.9, 0.7];
@@ -228,43 +228,52 @@ fn sound() -> Vec<Sample> {
     run.samples.unwrap()
 }
 
+/// What went otherwise, of all cases: a run of the test shows all of it.
+static WRONG: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+fn expect(is_so: bool, what: &str) {
+    if !is_so {
+        WRONG.lock().unwrap().push(what.to_owned());
+    }
+}
+
 impl Run {
     /// It was read in silence, and has the same samples.
     fn is_read_as(self, sound: &[Sample]) -> Case {
-        assert_eq!(self.case.said(), "");
-        assert_same(&self.samples.unwrap(), sound);
+        expect(self.case.said().is_empty(), self.case.said());
+        expect_same(self.samples.as_deref().unwrap_or_default(), sound);
         self.case
     }
 
     /// It ended with exit code 1 and these words.
     fn is_refused(self, words: &[&str]) -> Case {
-        assert_eq!(self.case.code(), 1, "{}", self.case.said());
+        expect(self.case.code() == 1, self.case.said());
         self.says(words)
     }
 
     /// It was used, and these words were said.
     fn is_used(self, words: &[&str]) -> Case {
-        assert_eq!(self.case.code(), 0, "{}", self.case.said());
+        expect(self.case.code() == 0, self.case.said());
         self.says(words)
     }
 
     fn says(self, words: &[&str]) -> Case {
         let said = self.case.said();
-        assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        let all = words.iter().all(|word| said.contains(word));
+        expect(all, &format!("{words:?}: {said}"));
         self.case
     }
 }
 
-fn assert_same(samples: &[Sample], sound: &[Sample]) {
-    assert_eq!(samples.len(), sound.len());
-    for (a, b) in samples.iter().zip(sound) {
-        assert_eq!(a.frame, b.frame);
-        for c in 0..3 {
-            assert!((a.rgb[c] / b.rgb[c] - 1.0).abs() < 5e-3, "{a:?} {b:?}");
-        }
-    }
+fn expect_same(samples: &[Sample], sound: &[Sample]) {
+    expect(samples.len() == sound.len(), "another number of samples");
+    let close = |(a, b): (&Sample, &Sample)| {
+        a.frame == b.frame && (0..3).all(|c| (a.rgb[c] / b.rgb[c] - 1.0).abs() < 5e-3)
+    };
+    expect(samples.iter().zip(sound).all(close), "other values");
 }
 
+// long: one folder after another, each with what is to be said of it.
 fn channels_and_windows(sound: &[Sample]) -> Vec<Case> {
     let one = |folder: &Path, window: [usize; 4], at: [i32; 2]| {
         let frame = &FRAMES[0][0];
@@ -295,13 +304,12 @@ fn channels_and_windows(sound: &[Sample]) -> Vec<Case> {
         }
     });
     // Its own reference takes out what the grey reference has of colour.
-    let green = grey.samples.as_ref().unwrap().iter().map(|s| s.rgb[1]);
-    assert!(
-        green
-            .zip(sound)
-            .all(|(g, s)| (g / s.rgb[1] - 1.0).abs() < 5e-3)
-    );
-    assert_eq!(grey.case.said(), "");
+    let green = grey.samples.iter().flatten().map(|s| s.rgb[1]);
+    let same = green
+        .zip(sound)
+        .filter(|(g, s)| (g / s.rgb[1] - 1.0).abs() < 5e-3);
+    expect(same.count() == sound.len(), "grey values are others");
+    expect(grey.case.said().is_empty(), grey.case.said());
     let missing = process("EXR with `R`, `G` and `A`", |folder| {
         write_exrs(folder);
         rename_channels(folder, ["R", "G", "A"], &[]);
@@ -314,27 +322,28 @@ fn channels_and_windows(sound: &[Sample]) -> Vec<Case> {
         "EXR whose data window is cropped, and rightly placed",
         |folder| {
             write_exrs(folder);
-            one(folder, [30, 0, PX - 30, PX], [30, 0]);
+            one(folder, [70, 0, PX - 70, PX], [70, 0]);
         },
     );
     // Three lines and most of the disc are there; the values are those of the whole frame.
-    let kept: Vec<Sample> = cropped.samples.clone().unwrap();
-    let of_frame = |samples: &[Sample]| samples.iter().filter(|s| s.frame == 0).count();
-    assert!(
-        (600..1225).contains(&of_frame(&kept)),
-        "{}",
-        of_frame(&kept)
+    let kept: Vec<Sample> = cropped.samples.clone().unwrap_or_default();
+    let of_frame: Vec<&Sample> = kept.iter().filter(|s| s.frame == 0).collect();
+    let count = of_frame.len();
+    expect(
+        (600..1225).contains(&count),
+        &format!("{count} samples are left"),
     );
-    let at = |s: &Sample| (s.frame, s.theta_i_deg.to_bits(), s.phi_i_deg.to_bits());
-    let places: std::collections::HashMap<_, _> = sound.iter().map(|s| (at(s), s.rgb[1])).collect();
-    let mut matched = 0;
-    for sample in kept.iter().filter(|s| s.frame == 0) {
-        if let Some(value) = places.get(&at(sample)) {
-            assert!((sample.rgb[1] / value - 1.0).abs() < 5e-3);
-            matched += 1;
-        }
-    }
-    assert!(matched > 500, "{matched}");
+    let at = |s: &Sample| [s.theta_i_deg, s.phi_i_deg];
+    let near = |a: &Sample, b: &Sample| (0..2).all(|i| (at(a)[i] - at(b)[i]).abs() < 0.05);
+    let there = of_frame.iter().filter(|s| {
+        let whole = sound.iter().find(|b| b.frame == 0 && near(s, b));
+        whole.is_some_and(|b| (s.rgb[1] / b.rgb[1] - 1.0).abs() < 0.01)
+    });
+    let there = there.count();
+    expect(
+        there > 500,
+        &format!("{there} of them have the whole frame's value"),
+    );
     let moved = process("EXR whose data window is moved by 20 pixels", |folder| {
         write_exrs(folder);
         one(folder, WHOLE, [20, 0]);
@@ -360,6 +369,7 @@ fn channels_and_windows(sound: &[Sample]) -> Vec<Case> {
     ]
 }
 
+// long: one folder after another, each with what is to be said of it.
 fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
     let turned = |came_in: &str, of: fn([usize; 2]) -> [usize; 2], all: bool| {
         process(came_in, |folder| {
@@ -409,7 +419,7 @@ fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     });
     let others: Vec<Sample> = sound.iter().filter(|s| s.frame != 1).copied().collect();
-    assert_same(broken.samples.as_ref().unwrap(), &others);
+    expect_same(broken.samples.as_deref().unwrap_or_default(), &others);
     let paths = process(
         "`frames.csv` with `.\\material_0.exr`, blanks and a folder of another computer",
         |folder| {
@@ -430,7 +440,11 @@ fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
             |[x, y]| [PX - 1 - x, PX - 1 - y],
             true,
         )
-        .is_refused(&["the frame is turned by 180 degrees"]),
+        .is_used(&[
+            "refused, 6 it does",
+            "the frame is turned by 180 degrees",
+            "2 frames seen from within 5 degrees of the normal are used, and would not show it",
+        ]),
         turned("a frame turned by 90°", |[x, y]| [y, PX - 1 - x], false).is_used(&[
             "the frame is turned by 90 degrees clockwise",
             "would not show it",
@@ -443,6 +457,7 @@ fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
     ]
 }
 
+// long: one folder after another, each with what is to be said of it.
 fn raw_exposures(sound: &[Sample]) -> Vec<Case> {
     let raws = |folder: &Path, times: &[f64]| write_raws(folder, times, None, None);
     let tiffs = process("16-bit TIFFs as raw exposures", |folder| {
@@ -463,12 +478,12 @@ fn raw_exposures(sound: &[Sample]) -> Vec<Case> {
             }
         }
     });
-    assert_eq!(tiffs.case.said(), "");
+    expect(tiffs.case.said().is_empty(), tiffs.case.said());
     // Noise of one exposure in patches of three by three pixels.
-    let ratios = tiffs.samples.as_ref().unwrap().iter().zip(sound);
+    let ratios = tiffs.samples.iter().flatten().zip(sound);
     let ratios: Vec<f32> = ratios.map(|(a, b)| (a.rgb[1] / b.rgb[1]).ln()).collect();
     let bias = ratios.iter().sum::<f32>() / ratios.len() as f32;
-    assert!(bias.abs() < 0.01, "{bias}");
+    expect(bias.abs() < 0.01, &format!("TIFFs: bias {bias}"));
     let srgb = |info: &mut png::Info<'_>| info.srgb = Some(png::SrgbRenderingIntent::Perceptual);
     let gamma = |info: &mut png::Info<'_>| info.source_gamma = Some(png::ScaledFloat::new(0.45455));
     let sixteen = png::BitDepth::Sixteen;
@@ -562,5 +577,7 @@ fn frames_are_read_refused_or_doubted_aloud() {
     let mut cases = channels_and_windows(&sound);
     cases.extend(cameras_and_turns(&sound));
     cases.extend(raw_exposures(&sound));
+    let wrong = WRONG.lock().unwrap();
+    assert!(wrong.is_empty(), "{wrong:#?}");
     document("frames", &cases);
 }

@@ -19,6 +19,7 @@ const PLANAR: u32 = 2;
 /// Bytes beside the counts of the frame that a file may ask for.
 const ROOM: usize = 1 << 24;
 
+// long: one check after another, each before what it lets through is made room for.
 pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, FileError> {
     let broken = |error: TiffError| match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {

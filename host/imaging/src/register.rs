@@ -229,15 +229,11 @@ impl Registrar {
         if let Some(turn) = self.turned(frame, view, predicted) {
             return RegistrationFailure::Turned(turn);
         }
-        if let RegistrationFailure::Displaced { .. } = failure {
-            return failure;
-        }
         // A target that is moved along two of its lines shows those two in their places.
-        let far_px = FAR_WIDTHS * frame.width as f64;
-        let strips = self.strips(frame, predicted, far_px);
-        let hough = self.hough(frame, &strips, far_px);
-        let fit = fit_lines(&strips, &Starts::Around(hough), &self.target);
-        match self.displacement(view, &strips, &fit.lines, FAR_WIDTHS) {
+        let found = [SEARCH_WIDTHS, FAR_WIDTHS]
+            .into_iter()
+            .find_map(|within| self.displacement(frame, view, predicted, within));
+        match found {
             Some(shift_px) => RegistrationFailure::Displaced { shift_px },
             None => failure,
         }
@@ -259,11 +255,19 @@ impl Registrar {
     /// How a frame in which the lines are not where they should be was turned, when they are once it is
     /// turned back. A square target straight from above is the same either way.
     fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
+        let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
         Turn::ALL.into_iter().find(|turn| {
-            let as_taken = turn.undo(frame);
-            let found = as_taken.map(|frame| self.locate(&frame, view, predicted));
-            // All of them: three lines may be others' that happen to fit.
-            matches!(found, Some(Ok(solution)) if solution.lines_found == SIDES.len())
+            let Some(as_taken) = turn.undo(frame) else {
+                return false;
+            };
+            let strips = self.strips(&as_taken, predicted, near_px);
+            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
+            // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
+            lines.iter().all(Option::is_some)
+                && self
+                    .estimate(view, &strips, &lines, &self.trust(ARM_DEG))
+                    .surprise
+                    <= MAX_SURPRISE
         })
     }
 
@@ -290,14 +294,8 @@ impl Registrar {
             // A striped fabric may have lines of its own, stronger than the fiducial lines beside them.
             let again = self.search(view, &strips, [None; 4]);
             again.map_err(|second| match second.reason {
-                // Hidden lines, and others where the pose has them: that says more than a layout of
-                // which nothing can be made; a target that is all there but elsewhere says all.
-                RegistrationFailure::LinesMissing { found }
-                    if found > 0
-                        && !matches!(failure.reason, RegistrationFailure::Displaced { .. }) =>
-                {
-                    second
-                }
+                // Hidden lines, and others where the pose has them: that says more.
+                RegistrationFailure::LinesMissing { found } if found > 0 => second,
                 _ => failure,
             })
         })
@@ -355,11 +353,7 @@ impl Registrar {
             // Three lines may not overrule the rig.
             && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
         if !fits {
-            let reason = match self.displacement(view, strips, &fit.lines, SEARCH_WIDTHS) {
-                Some(shift_px) => RegistrationFailure::Displaced { shift_px },
-                None => estimate.wrong_layout(),
-            };
-            return Err(Failure::new(reason, &fit));
+            return Err(Failure::new(estimate.wrong_layout(), &fit));
         }
         let shift = estimate.shift;
         let offset_deg = shift.theta.hypot(shift.phi * view.theta.sin()).to_degrees();
@@ -417,25 +411,50 @@ impl Registrar {
         self.estimate(view, strips, lines, &trust)
     }
 
-    /// How far the whole target is from its place, where all four lines fit once it is moved (and turned
-    /// a little) by about `within_widths` frame widths. Stripes of a fabric that are taken for the lines do not: they lie within all of them.
+    /// How far the whole target is from its place, where it is within so many frame widths: a camera
+    /// whose image is moved (and turned a little) must see all four lines.
     fn displacement(
         &self,
+        frame: &Frame,
         view: Direction,
-        strips: &[LineStrip; 4],
-        lines: &[Option<FoundLine>; 4],
+        predicted: &Homography,
         within_widths: f64,
     ) -> Option<[f64; 2]> {
-        if lines.iter().any(Option::is_none) {
-            return None;
-        }
         let trust = Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
             ..self.trust(ARM_DEG)
         };
-        let estimate = self.estimate(view, strips, lines, &trust);
-        (estimate.surprise <= MAX_SURPRISE).then_some(estimate.shift.shift_px)
+        let width = frame.width as f64;
+        let search_px = within_widths * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
+        let hough = self.hough(frame, &strips, search_px);
+        let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
+        // One of them may be something else's.
+        let choices = (0..=4).map(|out| {
+            let mut some = lines;
+            if let Some(line) = some.get_mut(out) {
+                *line = None;
+            }
+            some
+        });
+        choices.rev().find_map(|some| {
+            if some.iter().flatten().count() < MIN_LINES {
+                return None;
+            }
+            let guess = self.estimate(view, &strips, &some, &trust).shift;
+            let moved = CameraShift {
+                shift_px: guess.shift_px,
+                roll: guess.roll,
+                ..CameraShift::default()
+            };
+            let there = self.camera.predict(view, moved);
+            let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
+            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
+            let estimate = self.estimate(view, &strips, &lines, &trust);
+            let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(estimate.shift.shift_px)
+        })
     }
 
     fn trust(&self, arm_deg: f64) -> Trust {

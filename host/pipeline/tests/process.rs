@@ -305,7 +305,7 @@ fn frames_that_cannot_be_used_are_refused_and_counted() {
     .unwrap_err();
     assert!(matches!(
         error,
-        ProcessError::ReferenceRefused { refused: 1 }
+        ProcessError::ReferenceRefused { refused: 1, .. }
     ));
 }
 

@@ -115,11 +115,13 @@ pub enum ProcessError {
     },
     /// There are frames of the reference, and none of them is any good.
     #[error(
-        "none of the {refused} frames of the reference shows the target where its pose puts it: check rig.toml and the poses in frames.csv, or leave the reference's rows out to use an ideal light instead"
+        "none of the {refused} frames of the reference shows the target where its pose puts it ({why}): check rig.toml and the poses in frames.csv, or leave the reference's rows out to use an ideal light instead"
     )]
     ReferenceRefused {
         /// Frames of the reference.
         refused: usize,
+        /// What was found in the first of them.
+        why: String,
     },
     /// Eq. (3) needs more of the reference than was measured.
     #[error(transparent)]
@@ -207,8 +209,14 @@ pub fn process_sampled(
         },
     )?;
     if references.is_empty() && !reference.is_empty() {
-        let refused = reference.len();
-        return Err(ProcessError::ReferenceRefused { refused });
+        let why = frames.iter().find_map(|frame| match frame.outcome {
+            Outcome::Refused(Refusal::NotTheTarget(reason)) => Some(reason.to_string()),
+            _ => None,
+        });
+        return Err(ProcessError::ReferenceRefused {
+            refused: reference.len(),
+            why: why.unwrap_or_else(|| "they cannot be read".to_owned()),
+        });
     }
     let calibrator = Calibrator::new(
         rig,
