@@ -11,8 +11,8 @@ for speed in "$@"; do
     n=$((n + 1))
     gphoto2 --quiet --set-config shutterspeed="$speed" \
         --capture-image-and-download --force-overwrite --filename "$work/$n.raw"
-    # -D: counts as the sensor gave them; -4: 16 bits, linear
-    dcraw -c -D -4 "$work/$n.raw" >"$work/$n.pgm"
+    # -D: counts as the sensor gave them; -4: 16 bits, linear; -t 0: not turned as the camera was held
+    dcraw -c -D -4 -t 0 "$work/$n.raw" >"$work/$n.pgm"
     pnmtopng "$work/$n.pgm" >"$work/$n.png"
 done
 # All or none: what is missing is taken again as a whole.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Registers each frame by its fiducial lines, samples it, and calibrates it against the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear RGB radiance, of any rig. Raw exposures\n(PNG of 8 or 16 bits: mono, Bayer or RGB) have an exposure_s as well; rows of one frame and role are\nmerged by the [sensor] of rig.toml."
+    after_long_help = "Example:\n  gonia process capture/ -o samples.npy\n\nA capture folder holds rig.toml, frames.csv (frame, role, theta_i_deg, phi_i_deg, theta_v_deg,\nphi_v_deg, file) and the frames it names: OpenEXR, linear radiance, RGB or grey, of any rig. Raw\nexposures (PNG or TIFF of 8 or 16 bits: mono, Bayer or RGB, linear counts) have an exposure_s as well;\nrows of one frame and role are merged by the [sensor] of rig.toml. A frame that cannot be read is left\nout with a warning."
 )]
 pub struct Process {
     /// The capture folder
@@ -61,6 +61,7 @@ impl Process {
             (folder.rig().clone(), processed, facts)
         };
         remarks::print(&rig_remarks(self.folder.join(RIG).display(), &rig));
+        remarks::print(&processed.remarks);
         progress.stage("writing samples", |_| {
             write_noted_samples(&output, &processed.samples, &processed.note(facts))
         })?;

@@ -1,14 +1,14 @@
 //! `gonia rectify`: one frame as seen from straight above.
 
-use crate::output;
 use crate::say::outln;
+use crate::{output, remarks};
 use anyhow::{Result, bail};
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::{CaptureFolder, FileError, write_whole_bytes};
 use gonia_imaging::hdr::Radiance;
 use gonia_imaging::rectify::{View, rectify, rectify_variance};
 use gonia_imaging::{Registrar, Registration, RegistrationState};
-use gonia_pipeline::bracket::load_bracket;
+use gonia_pipeline::bracket::{Bracket, load_bracket};
 use gonia_render::{png, tone};
 use gonia_rig::{Frame, Role};
 use std::path::{Path, PathBuf};
@@ -130,7 +130,9 @@ impl Rectify {
     fn load(&self, folder: &CaptureFolder) -> Result<Radiance> {
         let row = self.row(folder)?;
         if !folder.exposures(row).is_empty() {
-            return Ok(load_bracket(folder, row)?);
+            let Bracket { radiance, remarks } = load_bracket(folder, row)?;
+            remarks::print(&remarks);
+            return Ok(radiance);
         }
         Ok(Radiance {
             frame: folder.load(row)?,

@@ -42,7 +42,7 @@ fn a_bracket_of_a_dslr_becomes_a_frame_and_a_camera_that_fails_gives_none() {
     stand_in(
         folder.path(),
         "dcraw",
-        "test \"$1 $2 $3\" = '-c -D -4'\ncat \"$4\"",
+        "test \"$1 $2 $3 $4 $5\" = '-c -D -4 -t 0'\ncat \"$6\"",
     );
     stand_in(folder.path(), "pnmtopng", "cat \"$1\"");
     let mut rig = Rig::paper(PX);

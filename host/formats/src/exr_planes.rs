@@ -8,7 +8,6 @@ use exr::prelude::{
     MetaData, ReadChannels, ReadLayers, Text, WritableImage, f16,
 };
 use gonia_rig::Scale;
-use half::slice::HalfFloatSliceExt;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
@@ -38,14 +37,6 @@ pub(super) enum Plane {
 }
 
 impl Plane {
-    /// Copies values from `start` on into `out`.
-    pub fn copy_to(&self, start: usize, out: &mut [f32]) {
-        match self {
-            Plane::F32(values) => out.copy_from_slice(&values[start..start + out.len()]),
-            Plane::F16(values) => values[start..start + out.len()].convert_to_f32_slice(out),
-        }
-    }
-
     /// In single precision; moved, not copied, where it already is.
     pub fn into_f32(self) -> Vec<f32> {
         match self {
@@ -188,7 +179,8 @@ pub(super) fn text_attributes(header: &exr::meta::header::Header) -> BTreeMap<St
         .collect()
 }
 
-fn unreadable(path: &Path, error: exr::error::Error) -> FileError {
+/// What is wrong with a file that the `exr` crate does not read.
+pub(super) fn unreadable(path: &Path, error: exr::error::Error) -> FileError {
     match error {
         exr::error::Error::Io(error) => FileError::reading(path, &error),
         exr::error::Error::NotSupported(what) => FileError::new(

@@ -42,6 +42,7 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
         table.column("file")?,
     ];
     let exposure = table.optional_column("exposure_s")?;
+    let folder = path.parent().unwrap_or(Path::new(""));
     let mut list = FrameList::default();
     let mut places = HashMap::new();
     while table.next_row()? {
@@ -52,7 +53,7 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
                 light: table.arm_direction(theta_i, phi_i)?,
                 view: table.arm_direction(theta_v, phi_v)?,
             },
-            file: parse_file(&table, file)?,
+            file: parse_file(&table, file, folder)?,
         };
         let exposure = exposure_of(&table, exposure, &row.file)?;
         let name = format!("{} frame {}", row.role.name(), row.frame);
@@ -124,31 +125,51 @@ fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
 }
 
 fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
-    match table.text(column)? {
-        "material" => Ok(Role::Material),
-        "reference" => Ok(Role::Reference),
-        other => Err(table.wrong(
-            format_args!("role \"{other}\" is unknown"),
+    let word = table.text(column)?;
+    let roles = [Role::Material, Role::Reference];
+    let role = roles
+        .into_iter()
+        .find(|role| word.eq_ignore_ascii_case(role.name()));
+    role.ok_or_else(|| {
+        table.wrong(
+            format_args!("role \"{word}\" is unknown"),
             "write material or reference",
-        )),
-    }
+        )
+    })
 }
 
-fn parse_file(table: &CsvTable, column: usize) -> Result<String, FileError> {
+fn parse_file(table: &CsvTable, column: usize, folder: &Path) -> Result<String, FileError> {
     let file = table.text(column)?;
     if file.is_empty() {
         return Err(table.wrong("the file is not named", "give its path inside the folder"));
     }
-    let inside = Path::new(file)
-        .components()
-        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !inside {
-        return Err(table.wrong(
+    inside(file, folder).ok_or_else(|| {
+        table.wrong(
             format_args!("\"{file}\" is not inside the capture folder"),
             "give a path relative to it, without \"..\"",
-        ));
-    }
-    Ok(file.to_owned())
+        )
+    })
+}
+
+/// A path of `frames.csv` relative to its folder, with `/` between its parts whatever system wrote it.
+/// An absolute path counts when it leads into the folder, here or, by the folder's name, on the
+/// computer that it was written on.
+fn inside(file: &str, folder: &Path) -> Option<String> {
+    let file = file.replace('\\', "/");
+    let has_drive = file.as_bytes().get(1) == Some(&b':');
+    let relative = if file.starts_with('/') || has_drive {
+        let here = std::path::absolute(folder).ok()?;
+        let within = Path::new(&file).strip_prefix(&here).ok();
+        let name = here.file_name()?.to_str()?;
+        let by_name = || file.rsplit_once(&format!("/{name}/")).map(|(_, rest)| rest);
+        within.and_then(Path::to_str).or_else(by_name)?
+    } else {
+        &file
+    };
+    let stays = Path::new(relative)
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    stays.then(|| relative.to_owned())
 }
 
 /// Writes `frames.csv` whole. Angles keep their nearest millionth of a degree.
@@ -257,6 +278,39 @@ mod tests {
         assert_eq!(rows[0].file, "f/1.exr");
         assert!((rows[0].pose.light.phi_deg() - 60.0).abs() < 1e-9);
         assert!((rows[0].pose.view.phi_deg() - 270.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn paths_of_other_systems_and_absolute_ones_lead_into_the_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("run 7");
+        std::fs::create_dir(&folder).unwrap();
+        let path = folder.join("frames.csv");
+        let file = |name: &str| {
+            std::fs::write(&path, format!("{HEADER}0, Material ,1,2,3,4,{name}\n")).unwrap();
+            read_frames_csv(&path).map(|list| list.rows[0].file.clone())
+        };
+        let absolute = folder.join("frames/1.exr");
+        for name in [
+            "frames/1.exr",
+            "frames\\1.exr",
+            " frames/1.exr\t",
+            absolute.to_str().unwrap(),
+            "C:\\data\\run 7\\frames\\1.exr",
+            "/home/else/run 7/frames/1.exr",
+        ] {
+            assert_eq!(file(name).unwrap(), "frames/1.exr", "{name}");
+        }
+        for name in [
+            "C:\\data\\frames\\1.exr",
+            "..\\1.exr",
+            "\\\\host\\share\\1.exr",
+            "/data/run 7/../1.exr",
+            "C:1.exr",
+        ] {
+            let error = file(name).unwrap_err().to_string();
+            assert!(error.contains("not inside the capture folder"), "{error}");
+        }
     }
 
     #[test]

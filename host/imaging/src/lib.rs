@@ -22,11 +22,13 @@ pub mod rectify;
 mod refine;
 mod register;
 mod sampling;
+mod turn;
 
 pub use ideal_light::IdealLight;
 pub use occlusion::{Mask, find_occlusion};
 pub use register::{PoseOffset, Registrar, Registration, RegistrationFailure, RegistrationState};
 pub use sampling::{LeftOut, PointValue, SamplingGrid};
+pub use turn::Turn;
 
 /// Mean of the three channels: what fiducial lines and occlusions are looked for in.
 fn luminance(rgb: [f32; 3]) -> f32 {

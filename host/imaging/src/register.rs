@@ -8,6 +8,7 @@
 use crate::hough::{StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
+use crate::turn::Turn;
 use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
@@ -39,12 +40,16 @@ const MAX_SURPRISE: f64 = 25.0;
 const MAX_DEVIATION: f64 = 6.0;
 /// Standard deviation of an arm that does not hold its 0.03°.
 const LOOSE_ARM_DEG: f64 = 0.5;
+/// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
+const LOOSE_ROLL_DEG: f64 = 1.0;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
 const HOUGH_RESOLUTION: f64 = 0.5;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
 const SEARCH_WIDTHS: f64 = 0.02;
+/// Half the width of the neighbourhood in which a displaced target is looked for.
+const FAR_WIDTHS: f64 = 0.15;
 /// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
 const NEAR_WIDTHS: f64 = 1e-3;
 /// A line further than this from its prediction is measured again from a better one.
@@ -115,6 +120,18 @@ pub enum RegistrationFailure {
         /// How far that camera's roll, shift or magnification is off, in standard deviations.
         deviation: f64,
     },
+    /// The lines found are those of the target, but all of it is elsewhere in the frame.
+    #[error(
+        "the target is seen {:+.1} pixels to the right and {:+.1} down from there",
+        .shift_px[0], .shift_px[1]
+    )]
+    Displaced {
+        /// How far right and down of its place the target is, pixels.
+        shift_px: [f64; 2],
+    },
+    /// The lines are where they should be once the frame is turned back.
+    #[error("the frame is {0}")]
+    Turned(Turn),
     /// The lines ask for a camera too far from its arm's reading.
     #[error("the lines put the camera {offset_deg:.1} degrees from its arm's reading")]
     FarFromPose {
@@ -156,13 +173,7 @@ impl Registrar {
     /// lines it falls back to the prediction, and says so.
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
-        let mut solved = self.solve(frame, reading.view, &predicted);
-        if let Ok(solution) = &solved
-            && solution.furthest_px > RELINEARIZE_PX
-        {
-            solved = self.solve(frame, reading.view, &solution.homography);
-        }
-        match solved {
+        match self.locate(frame, reading.view, &predicted) {
             Ok(solution) => Registration {
                 view: Direction::from_deg(
                     (reading.view.theta + solution.shift.theta).to_degrees(),
@@ -179,17 +190,86 @@ impl Registrar {
                 state: RegistrationState::Locked,
                 camera: self.camera.clone(),
             },
-            Err(failure) => Registration {
-                pixel_from_target: predicted,
-                residual_px: failure.scatter_px,
-                pose_offset: PoseOffset::default(),
-                view: reading.view,
-                blur_px: failure.blur_px,
-                lines_found: failure.lines_found,
-                state: RegistrationState::FellBack(failure.reason),
-                camera: self.camera.clone(),
-            },
+            Err(failure) => {
+                let reason = self.explain(frame, reading.view, &predicted, failure.reason);
+                Registration {
+                    pixel_from_target: predicted,
+                    residual_px: failure.scatter_px,
+                    pose_offset: PoseOffset::default(),
+                    view: reading.view,
+                    blur_px: failure.blur_px,
+                    lines_found: failure.lines_found,
+                    state: RegistrationState::FellBack(reason),
+                    camera: self.camera.clone(),
+                }
+            }
         }
+    }
+
+    fn locate(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+    ) -> Result<Solution, Failure> {
+        let solution = self.solve(frame, view, predicted)?;
+        if solution.furthest_px > RELINEARIZE_PX {
+            return self.solve(frame, view, &solution.homography);
+        }
+        Ok(solution)
+    }
+
+    /// A failure, or what is behind it where the whole target is elsewhere.
+    fn explain(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        failure: RegistrationFailure,
+    ) -> RegistrationFailure {
+        if let Some(turn) = self.turned(frame, view, predicted) {
+            return RegistrationFailure::Turned(turn);
+        }
+        // A target that is moved along two of its lines shows those two in their places.
+        let found = [SEARCH_WIDTHS, FAR_WIDTHS]
+            .into_iter()
+            .find_map(|within| self.displacement(frame, view, predicted, within));
+        match found {
+            Some(shift_px) => RegistrationFailure::Displaced { shift_px },
+            None => failure,
+        }
+    }
+
+    /// The strongest lines within `search_px` of their predictions.
+    fn hough(
+        &self,
+        frame: &Frame,
+        strips: &[LineStrip; 4],
+        search_px: f64,
+    ) -> [Option<StripLine>; 4] {
+        let half_width = 0.5 * self.target.line_width_mm;
+        strips
+            .each_ref()
+            .map(|strip| strongest_line(frame, strip, half_width, search_px, self.hough_resolution))
+    }
+
+    /// How a frame in which the lines are not where they should be was turned, when they are once it is
+    /// turned back. A square target straight from above is the same either way.
+    fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
+        let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
+        Turn::ALL.into_iter().find(|turn| {
+            let Some(as_taken) = turn.undo(frame) else {
+                return false;
+            };
+            let strips = self.strips(&as_taken, predicted, near_px);
+            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
+            // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
+            lines.iter().all(Option::is_some)
+                && self
+                    .estimate(view, &strips, &lines, &self.trust(ARM_DEG))
+                    .surprise
+                    <= MAX_SURPRISE
+        })
     }
 
     fn solve(
@@ -210,10 +290,7 @@ impl Registrar {
         }
         let search_px = SEARCH_WIDTHS * width + 4.0;
         let strips = self.strips(frame, predicted, search_px);
-        let half_width = 0.5 * self.target.line_width_mm;
-        let hough = strips.each_ref().map(|strip| {
-            strongest_line(frame, strip, half_width, search_px, self.hough_resolution)
-        });
+        let hough = self.hough(frame, &strips, search_px);
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the fiducial lines beside them.
             let again = self.search(view, &strips, [None; 4]);
@@ -338,10 +415,58 @@ impl Registrar {
         self.estimate(view, strips, lines, &trust)
     }
 
+    /// How far the whole target is from its place, where it is within so many frame widths: a camera
+    /// whose image is moved (and turned a little) must see all four lines.
+    fn displacement(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+    ) -> Option<[f64; 2]> {
+        let trust = Trust {
+            shift_widths: within_widths,
+            roll_deg: LOOSE_ROLL_DEG,
+            ..self.trust(ARM_DEG)
+        };
+        let width = frame.width as f64;
+        let search_px = within_widths * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
+        let hough = self.hough(frame, &strips, search_px);
+        let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
+        // One of them may be something else's.
+        let choices = (0..=4).map(|out| {
+            let mut some = lines;
+            if let Some(line) = some.get_mut(out) {
+                *line = None;
+            }
+            some
+        });
+        choices.rev().find_map(|some| {
+            if some.iter().flatten().count() < MIN_LINES {
+                return None;
+            }
+            let guess = self.estimate(view, &strips, &some, &trust).shift;
+            let moved = CameraShift {
+                shift_px: guess.shift_px,
+                roll: guess.roll,
+                ..CameraShift::default()
+            };
+            let there = self.camera.predict(view, moved);
+            let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
+            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
+            let estimate = self.estimate(view, &strips, &lines, &trust);
+            let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(estimate.shift.shift_px)
+        })
+    }
+
     fn trust(&self, arm_deg: f64) -> Trust {
         let width = self.camera.size_px[0] as f64;
         Trust {
             arm_deg,
+            roll_deg: ROLL_DEG,
+            shift_widths: SHIFT_WIDTHS,
             model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
         }
     }
@@ -386,7 +511,7 @@ impl Registrar {
         let Some(weight) = covariance.cholesky().map(|c| c.inverse()) else {
             return failed;
         };
-        let scale = self.prior_scale(trust.arm_deg);
+        let scale = self.prior_scale(trust);
         let model = |p: &DVector<f64>| self.line_places(view, shift_from(p, &scale), strips);
         let mut p = DVector::zeros(6);
         let mut places = model(&p);
@@ -436,12 +561,12 @@ impl Registrar {
         LINE_FLOOR_PX.powi(2) + crowded * crowded
     }
 
-    fn prior_scale(&self, arm_deg: f64) -> [f64; 6] {
-        let shift = SHIFT_WIDTHS * self.camera.size_px[0] as f64;
+    fn prior_scale(&self, trust: &Trust) -> [f64; 6] {
+        let shift = trust.shift_widths * self.camera.size_px[0] as f64;
         [
-            arm_deg.to_radians(),
-            arm_deg.to_radians(),
-            ROLL_DEG.to_radians(),
+            trust.arm_deg.to_radians(),
+            trust.arm_deg.to_radians(),
+            trust.roll_deg.to_radians(),
             shift,
             shift,
             LN_SCALE,
@@ -531,6 +656,10 @@ struct Estimate {
 struct Trust {
     /// Standard deviation of the arm's reading, degrees.
     arm_deg: f64,
+    /// Standard deviation of the camera's roll, degrees.
+    roll_deg: f64,
+    /// Standard deviation of the image's shift, in frame widths.
+    shift_widths: f64,
     /// Standard deviation of the model's lines, pixels.
     model_px: f64,
 }

@@ -1,6 +1,7 @@
 //! Registration against the simulator's truth.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_imaging::*;
 use gonia_rig::{CameraModel, CameraShift, Frame, Rig, Role};
@@ -217,4 +218,97 @@ fn a_frame_of_something_else_falls_back_and_says_why() {
             assert_eq!(corner_error(&found, &rig, reading), 0.0);
         }
     }
+}
+
+/// A frame with pixel (x, y) taken from `of(x, y)`; black where that is outside.
+fn moved(frame: &Frame, of: impl Fn([i64; 2]) -> [i64; 2]) -> Frame {
+    let (width, height) = (frame.width as i64, frame.height as i64);
+    let pixels = (0..width * height).map(|i| of([i % width, i / width]));
+    let rgb = pixels.map(|[x, y]| {
+        let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+        if is_inside {
+            frame.rgb[(y * width + x) as usize]
+        } else {
+            [0.0; 3]
+        }
+    });
+    Frame {
+        rgb: rgb.collect(),
+        ..*frame
+    }
+}
+
+#[test]
+fn turned_and_mirrored_frames_are_told_from_straight_ones() {
+    let scene = Scene::of_fabric(240);
+    let registrar = Registrar::new(&scene.geometry.to_rig());
+    let last = 239;
+    type Of = fn([i64; 2], i64) -> [i64; 2];
+    let turns: [(Turn, Of); 4] = [
+        (Turn::Half, |[x, y], l| [l - x, l - y]),
+        (Turn::Right, |[x, y], l| [y, l - x]),
+        (Turn::Left, |[x, y], l| [l - y, x]),
+        (Turn::Mirrored, |[x, y], l| [l - x, y]),
+    ];
+    for [tv, pv] in [[15.0, 65.0], [30.0, 20.0], [45.0, 200.0], [60.0, 285.0]] {
+        let pose = Pose::from_deg([30.0, 140.0, tv, pv]);
+        for role in [Role::Material, Role::Reference] {
+            let frame = scene.frame(role, pose, 1);
+            for (turn, of) in turns {
+                let found = registrar.register(&moved(&frame, |p| of(p, last)), pose);
+                let expected = RegistrationFailure::Turned(turn);
+                assert_eq!(
+                    found.state,
+                    RegistrationState::FellBack(expected),
+                    "{tv} {pv}"
+                );
+            }
+        }
+    }
+    // From straight above a square shows nothing of it.
+    let above = Pose::from_deg([30.0, 140.0, 0.0, 0.0]);
+    let frame = scene.frame(Role::Material, above, 1);
+    let found = registrar.register(&moved(&frame, |p| turns[0].1(p, last)), above);
+    assert_eq!(found.state, RegistrationState::Locked);
+}
+
+#[test]
+fn a_target_that_is_elsewhere_in_the_frame_is_not_kept_by_its_pose() {
+    let (mut frames, mut named, mut kept) = (0, 0, Vec::new());
+    for (px, by) in [
+        (240, [2, 0]),
+        (240, [0, -5]),
+        (240, [20, 0]),
+        (400, [9, 4]),
+        (400, [0, 40]),
+    ] {
+        let scene = Scene::of_fabric(px);
+        let registrar = Registrar::new(&scene.geometry.to_rig());
+        for [tv, pv] in [[0.0, 0.0], [30.0, 20.0], [60.0, 90.0], [75.0, 285.0]] {
+            let pose = Pose::from_deg([30.0, 140.0, tv, pv]);
+            for role in [Role::Material, Role::Reference] {
+                let frame = scene.frame(role, pose, 1);
+                let frame = moved(&frame, |[x, y]| [x - by[0], y - by[1]]);
+                let found = registrar.register(&frame, pose);
+                frames += 1;
+                match found.state {
+                    RegistrationState::FellBack(RegistrationFailure::Displaced { shift_px }) => {
+                        let off = [0, 1].map(|i| shift_px[i] - by[i] as f64);
+                        let off = off[0].hypotenuse(off[1]);
+                        assert!(off < 0.3, "{px} {by:?} {tv} {pv}: {shift_px:?}");
+                        named += 1;
+                    }
+                    // Refused all the same, if with less of a reason.
+                    RegistrationState::FellBack(
+                        RegistrationFailure::WrongLayout { .. }
+                        | RegistrationFailure::LinesMissing { found: 0 | 1 },
+                    ) => {}
+                    other => kept.push(format!("{px} {by:?} {tv} {pv} {role:?}: {other:?}")),
+                }
+            }
+        }
+    }
+    println!("{named} of {frames} are told to be displaced");
+    assert!(kept.is_empty(), "{kept:#?}");
+    assert!(4 * named >= 3 * frames, "{named} of {frames}");
 }

@@ -133,16 +133,16 @@ impl Processed {
 
     /// Frames used, and frames refused by reason.
     pub fn frame_counts(&self) -> FrameCounts {
-        let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
+        // What is said of the first frame of each kind, and how many there are.
+        let mut reasons: BTreeMap<String, (String, u64)> = BTreeMap::new();
         let mut kept = 0;
         for frame in &self.frames {
             match frame.outcome {
                 Outcome::Refused(refusal) => {
                     // Numbers in a reason would make every frame a reason of its own.
-                    let words = refusal
-                        .to_string()
-                        .replace(|c: char| c.is_ascii_digit(), "#");
-                    *reasons.entry(words).or_default() += 1;
+                    let words = refusal.to_string();
+                    let kind: String = words.chars().filter(|c| c.is_alphabetic()).collect();
+                    reasons.entry(kind).or_insert((words, 0)).1 += 1;
                 }
                 Outcome::Locked | Outcome::FellBack(_) => kept += 1,
             }
@@ -151,7 +151,7 @@ impl Processed {
             kept,
             refused: reasons
                 .into_iter()
-                .map(|(reason, count)| Refused { reason, count })
+                .map(|(_, (reason, count))| Refused { reason, count })
                 .collect(),
         }
     }

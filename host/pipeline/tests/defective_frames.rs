@@ -388,7 +388,11 @@ fn look(
             Refusal::NotTheTarget(RegistrationFailure::FarFromPose { .. }) => {
                 "lines far from the pose"
             }
-            Refusal::NoReference => "no reference",
+            Refusal::NotTheTarget(RegistrationFailure::Displaced { .. }) => {
+                "target elsewhere in the frame"
+            }
+            Refusal::NotTheTarget(RegistrationFailure::Turned(_)) => "turned or mirrored",
+            Refusal::NoReference | Refusal::Unusable => "no reference",
         };
         if !row.why.contains(&why) {
             row.why.push(why);

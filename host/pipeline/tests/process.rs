@@ -306,7 +306,7 @@ fn frames_that_cannot_be_used_are_refused_and_counted() {
     .unwrap_err();
     assert!(matches!(
         error,
-        ProcessError::ReferenceRefused { refused: 1 }
+        ProcessError::ReferenceRefused { refused: 1, .. }
     ));
 }
 
@@ -324,16 +324,40 @@ fn a_frame_that_cannot_be_read_or_has_another_size_is_named() {
         "{error}"
     );
     rig.camera.width_px = 200;
+    let run = |source: &Rendered| {
+        process(&rig, source, &Masks::default(), &|_, _| {
+            ControlFlow::Continue(())
+        })
+    };
+    let sound = run(&source).unwrap();
+    assert_eq!(sound.remarks, []);
     source.add(Role::Reference, UNREADABLE);
-    let error = process(&rig, &source, &Masks::default(), &|_, _| {
-        ControlFlow::Continue(())
-    })
-    .unwrap_err()
-    .to_string();
+    source.add(Role::Material, UNREADABLE);
+    let rest = run(&source).unwrap();
+    assert_eq!(rest.samples, sound.samples);
+    let said: Vec<String> = rest.remarks.iter().map(ToString::to_string).collect();
     assert_eq!(
-        error,
-        "frame 12: frames/000012.exr: the file is truncated; copy it again"
+        said,
+        [
+            "reference frame 12: is left out; frames/000012.exr: the file is truncated; copy it again",
+            "material frame 13: is left out; frames/000013.exr: the file is truncated; copy it again",
+        ]
     );
+    let refused = |f: &&FrameReport| f.outcome == Outcome::Refused(Refusal::Unusable);
+    assert_eq!(rest.frames.iter().filter(refused).count(), 2);
+    // Nothing is left of the reference, or of the material.
+    for (role, frame) in [(Role::Material, 12), (Role::Reference, 13)] {
+        let all = source.rows.clone();
+        source
+            .rows
+            .retain(|row| row.role == role || row.frame == frame);
+        let error = run(&source).unwrap_err().to_string();
+        source.rows = all;
+        assert_eq!(
+            error,
+            format!("frame {frame}: frames/{frame:06}.exr: the file is truncated; copy it again")
+        );
+    }
     source.rows.clear();
     let error = process(&rig, &source, &Masks::default(), &|_, _| {
         ControlFlow::Continue(())

@@ -5,16 +5,25 @@ use gonia_brdf::Direction;
 use gonia_brdf::Elementary;
 use nalgebra::{Matrix3, Rotation2};
 
-/// Intrinsics and distance of the camera. *Ideal* pixels are those of a pinhole; a lens with radial
-/// distortion moves them: x = x'·(1 + k1·r² + k2·r⁴), x' the ideal position from the principal
-/// point in focal lengths, r its length.
+/// Rounds in which the inverse of a lens is sought, and the step (in focal lengths) at which it is found.
+const LEAST_ROUNDS: usize = 8;
+const MOST_ROUNDS: usize = 100;
+const SETTLED: f64 = 1e-9;
+
+/// Intrinsics and distance of the camera. *Ideal* pixels are those of a pinhole; a lens moves them, with
+/// x, y the ideal position from the principal point in focal lengths, and r its length, as OpenCV has
+/// it: x becomes x·(1 + k1·r² + k2·r⁴ + k3·r⁶) + 2·p1·x·y + p2·(r² + 2x²), and y becomes
+/// y·(1 + k1·r² + k2·r⁴ + k3·r⁶) + p1·(r² + 2y²) + 2·p2·x·y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
     distance_mm: f64,
-    focal_px: f64,
+    /// Along rows and columns.
+    focal_px: [f64; 2],
     centre_px: [f64; 2],
-    k1: f64,
-    k2: f64,
+    /// k1, k2, k3.
+    radial: [f64; 3],
+    /// p1, p2.
+    tangential: [f64; 2],
     /// Width and height of a frame, pixels.
     pub size_px: [usize; 2],
 }
@@ -39,17 +48,20 @@ impl CameraModel {
     pub fn new(camera: &CameraGeometry) -> Self {
         Self {
             distance_mm: camera.distance_m * 1000.0,
-            focal_px: camera.focal_px,
+            focal_px: [
+                camera.focal_px,
+                camera.focal_y_px.unwrap_or(camera.focal_px),
+            ],
             centre_px: camera.centre_px,
-            k1: camera.k1,
-            k2: camera.k2,
+            radial: [camera.k1, camera.k2, camera.k3],
+            tangential: [camera.p1, camera.p2],
             size_px: [camera.width_px, camera.height_px],
         }
     }
 
     /// Whether the lens bends straight lines.
     pub fn is_distorted(&self) -> bool {
-        self.k1 != 0.0 || self.k2 != 0.0
+        self.radial != [0.0; 3] || self.tangential != [0.0; 2]
     }
 
     /// The map from millimetres on the target to ideal pixels, for a camera that looks at the
@@ -58,8 +70,11 @@ impl CameraModel {
         let (st, ct) = (view.theta + by.theta).sine_cosine();
         let (sp, cp) = (view.phi + by.phi).sine_cosine();
         let turn = Rotation2::new(by.roll);
-        let focal = self.focal_px * by.log_scale.exponential();
-        let image = |right: f64, down: f64| turn * nalgebra::Vector2::new(right, down) * focal;
+        let focal = self.focal_px.map(|f| f * by.log_scale.exponential());
+        let image = |right: f64, down: f64| {
+            let turned = turn * nalgebra::Vector2::new(right, down);
+            [turned[0] * focal[0], turned[1] * focal[1]]
+        };
         // Columns: where a step along x, a step along y and the centre go; the last row is depth.
         let (x, y) = (image(-sp, ct * cp), image(cp, ct * sp));
         let k = Matrix3::new(
@@ -93,10 +108,12 @@ impl CameraModel {
         if !self.is_distorted() {
             return ideal;
         }
-        let x = [0, 1].map(|i| (ideal[i] - self.centre_px[i]) / self.focal_px);
-        let r2 = x[0] * x[0] + x[1] * x[1];
-        let stretch = 1.0 + r2 * (self.k1 + r2 * self.k2);
-        [0, 1].map(|i| self.centre_px[i] + self.focal_px * x[i] * stretch)
+        let x = self.relative_to_centre(ideal);
+        let (stretch, aside) = self.lens(x);
+        [0, 1].map(|i| {
+            let focal = self.focal_px[i];
+            self.centre_px[i] + focal * x[i] * stretch + focal * aside[i]
+        })
     }
 
     /// The ideal pixel that the lens puts at `pixel`.
@@ -104,14 +121,38 @@ impl CameraModel {
         if !self.is_distorted() {
             return pixel;
         }
-        let seen = [0, 1].map(|i| (pixel[i] - self.centre_px[i]) / self.focal_px);
+        let seen = self.relative_to_centre(pixel);
         let mut x = seen;
-        // Converges by a factor of about |k1|·r² a round: far below a thousandth of a pixel here.
-        for _ in 0..8 {
-            let r2 = x[0] * x[0] + x[1] * x[1];
-            x = seen.map(|c| c / (1.0 + r2 * (self.k1 + r2 * self.k2)));
+        // Converges by a factor of about |k1|·r² a round: usually far below a thousandth of a pixel
+        // after the least number of rounds.
+        for round in 1..=MOST_ROUNDS {
+            let (stretch, aside) = self.lens(x);
+            let next = [0, 1].map(|i| (seen[i] - aside[i]) / stretch);
+            let moved = (next[0] - x[0]).abs().max((next[1] - x[1]).abs());
+            x = next;
+            if round >= LEAST_ROUNDS && moved < SETTLED {
+                break;
+            }
         }
-        [0, 1].map(|i| self.centre_px[i] + self.focal_px * x[i])
+        [0, 1].map(|i| self.centre_px[i] + self.focal_px[i] * x[i])
+    }
+
+    /// From the principal point, in focal lengths.
+    fn relative_to_centre(&self, pixel: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|i| (pixel[i] - self.centre_px[i]) / self.focal_px[i])
+    }
+
+    /// By how much the lens stretches an ideal position, and how far it moves it aside.
+    fn lens(&self, x: [f64; 2]) -> (f64, [f64; 2]) {
+        let r2 = x[0] * x[0] + x[1] * x[1];
+        let [k1, k2, k3] = self.radial;
+        let [p1, p2] = self.tangential;
+        let both = 2.0 * x[0] * x[1];
+        let aside = [
+            p1 * both + p2 * (r2 + 2.0 * x[0] * x[0]),
+            p1 * (r2 + 2.0 * x[1] * x[1]) + p2 * both,
+        ];
+        (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)), aside)
     }
 }
 
@@ -138,6 +179,37 @@ mod tests {
         let (near, far) = (at(60.0, 90.0, [0.0, 100.0]), at(60.0, 90.0, [0.0, -100.0]));
         assert!(near[1] > 200.0 && near[1] - 200.0 > 200.0 - far[1]);
         assert!(at(60.0, 90.0, [-100.0, 0.0])[0] > 200.0);
+    }
+
+    #[test]
+    fn the_lens_is_that_of_opencv() {
+        // cv2.projectPoints of (0.21, -0.34, 1) with fx 900, fy 880, cx 500, cy 510 and these five:
+        // worked out by its documented formula, x'' = 0.21·d + 2·p1·x·y + p2·(r² + 2x²), d = 1 + ….
+        let mut rig = Rig::paper(1024);
+        let camera = &mut rig.camera;
+        (camera.focal_px, camera.focal_y_px) = (900.0, Some(880.0));
+        camera.centre_px = [500.0, 510.0];
+        (camera.k1, camera.k2, camera.k3) = (-0.25, 0.11, -0.03);
+        (camera.p1, camera.p2) = (0.002, -0.003);
+        let model = CameraModel::new(camera);
+        let ideal = [500.0 + 900.0 * 0.21, 510.0 - 880.0 * 0.34];
+        // r² = 0.1597; d = 1 − 0.039925 + 0.00280545… − 0.000122189… = 0.96275826…
+        let d = 1.0 - 0.25 * 0.1597 + 0.11 * 0.1597f64.powi(2) - 0.03 * 0.1597f64.powi(3);
+        let x = 0.21 * d - 2.0 * 0.002 * 0.0714 - 0.003 * (0.1597 + 0.0882);
+        let y = -0.34 * d + 0.002 * (0.1597 + 0.2312) + 2.0 * 0.003 * 0.0714;
+        let seen = model.distort(ideal);
+        assert!((seen[0] - (500.0 + 900.0 * x)).abs() < 1e-9, "{seen:?}");
+        assert!((seen[1] - (510.0 + 880.0 * y)).abs() < 1e-9, "{seen:?}");
+        let back = model.undistort(seen);
+        assert!((back[0] - ideal[0]).hypotenuse(back[1] - ideal[1]) < 1e-4);
+        // A pixel that is less high than wide: a step down is fewer pixels than one to the right.
+        let at = |mm| {
+            model
+                .predict(Direction::from_deg(0.0, 0.0), CameraShift::default())
+                .apply(mm)
+        };
+        assert!((at([0.0, 90.0])[0] - 500.0 - 900.0 * 0.05).abs() < 1e-9);
+        assert!((at([90.0, 0.0])[1] - 510.0 - 880.0 * 0.05).abs() < 1e-9);
     }
 
     #[test]

@@ -1,10 +1,15 @@
 //! Whether a rig could exist.
 
-use crate::bench_setup::check_bench;
+use crate::bench_setup::{Source, check_bench};
 use crate::rig_error::within;
 use crate::{
-    CameraGeometry, LightGeometry, Reference, Remark, Rig, RigError, Sampling, Sensor, Target,
+    CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig, RigError, Sampling, Sensor,
+    Target,
 };
+use gonia_brdf::Elementary;
+
+/// A lens whose inverse is off by more than this at a corner of the frame, pixels, has none.
+const MAX_FOLD_PX: f64 = 0.5;
 
 /// Checks that a rig could exist, whoever made it.
 ///
@@ -13,6 +18,7 @@ use crate::{
 pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     within("light.distance_m", rig.light.distance_m, 0.01..=1000.0, "m")?;
     check_camera(&rig.camera)?;
+    check_simulated(&rig.camera, rig.source.as_ref())?;
     check_target(&rig.target)?;
     if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
         for rho in *reflectance {
@@ -86,8 +92,58 @@ fn check_camera(camera: &CameraGeometry) -> Result<(), RigError> {
         let side = side as f64;
         within("camera.centre_px", centre, -side..=2.0 * side, "px")?;
     }
-    within("camera.k1", camera.k1, -10.0..=10.0, "")?;
-    within("camera.k2", camera.k2, -10.0..=10.0, "")?;
+    if let Some(focal) = camera.focal_y_px {
+        let x = camera.focal_px;
+        // Pixels of half or twice the width; beyond that one of the two is a slip.
+        within("camera.focal_y_px", focal, 0.5 * x..=2.0 * x, "px")?;
+    }
+    for (key, value) in [
+        ("camera.k1", camera.k1),
+        ("camera.k2", camera.k2),
+        ("camera.k3", camera.k3),
+    ] {
+        within(key, value, -10.0..=10.0, "")?;
+    }
+    for (key, value) in [("camera.p1", camera.p1), ("camera.p2", camera.p2)] {
+        within(key, value, -1.0..=1.0, "")?;
+    }
+    check_lens(camera)
+}
+
+/// The simulated camera draws two radial terms and square pixels: with others its frames would be of
+/// another lens than the rig's.
+fn check_simulated(camera: &CameraGeometry, source: Option<&Source>) -> Result<(), RigError> {
+    let others = [camera.k3, camera.p1, camera.p2];
+    let is_plain = others == [0.0; 3] && camera.focal_y_px.is_none_or(|f| f == camera.focal_px);
+    match source {
+        Some(Source::Simulated { .. }) if !is_plain => Err(RigError::new(
+            "source.kind",
+            "the simulated camera has no focal_y_px, k3, p1 or p2".into(),
+            "leave them out of [camera], or give frames of this camera",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Checks that the lens has an inverse over the frame: terms of another order, or of another program's
+/// model, fold its corners inwards.
+fn check_lens(camera: &CameraGeometry) -> Result<(), RigError> {
+    let model = CameraModel::new(camera);
+    let (width, height) = (camera.width_px as f64, camera.height_px as f64);
+    for corner in [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]] {
+        let back = model.distort(model.undistort(corner));
+        let off = (back[0] - corner[0]).hypotenuse(back[1] - corner[1]);
+        if off.is_nan() || off > MAX_FOLD_PX {
+            return Err(RigError::new(
+                "camera.k1",
+                format!(
+                    "the lens terms have no inverse at the corner ({}, {}) of the frame",
+                    corner[0], corner[1]
+                ),
+                "give k1, k2, p1, p2, k3 as OpenCV's calibration does, in units of the focal length",
+            ));
+        }
+    }
     Ok(())
 }
 
@@ -247,5 +303,61 @@ mod tests {
         }
         let error = check_rig(&rig_of([98.5, 99.0, 99.0])).unwrap_err();
         assert!(error.problem.contains("percentage"), "{error}");
+    }
+
+    fn wrong(change: impl FnOnce(&mut Rig)) -> Option<&'static str> {
+        let mut rig = Rig::paper(400);
+        change(&mut rig);
+        check_rig(&rig).err().map(|error| error.key)
+    }
+
+    #[test]
+    fn lenses_without_an_inverse_and_pixels_that_are_hardly_square_are_refused() {
+        assert_eq!(wrong(|_| {}), None);
+        // A wide lens as OpenCV gives it; a telephoto with large terms at small radii.
+        assert_eq!(
+            wrong(|rig| {
+                let camera = &mut rig.camera;
+                (camera.focal_px, camera.focal_y_px) = (300.0, Some(299.0));
+                (camera.k1, camera.k2, camera.k3) = (-0.29, 0.105, -0.02);
+                (camera.p1, camera.p2) = (0.001, -0.0005);
+            }),
+            None
+        );
+        assert_eq!(
+            wrong(|rig| (rig.camera.k1, rig.camera.k2) = (-0.4, 9.0)),
+            None
+        );
+        // In pixels instead of focal lengths; a term too many.
+        assert_eq!(
+            wrong(|rig| (rig.camera.focal_px, rig.camera.k1) = (200.0, -2.0)),
+            Some("camera.k1")
+        );
+        assert_eq!(
+            wrong(|rig| rig.camera.focal_y_px = Some(6.0)),
+            Some("camera.focal_y_px")
+        );
+        assert_eq!(wrong(|rig| rig.camera.p1 = 3.0), Some("camera.p1"));
+    }
+
+    #[test]
+    fn the_simulated_camera_has_two_radial_terms() {
+        let simulated = Some(Source::Simulated {
+            seed: 1,
+            exact: false,
+        });
+        let with = |change: fn(&mut Rig)| {
+            wrong(|rig| {
+                rig.source.clone_from(&simulated);
+                change(rig);
+            })
+        };
+        assert_eq!(with(|rig| rig.camera.k1 = -0.1), None);
+        assert_eq!(
+            with(|rig| rig.camera.focal_y_px = Some(rig.camera.focal_px)),
+            None
+        );
+        assert_eq!(with(|rig| rig.camera.p2 = 0.001), Some("source.kind"));
+        assert_eq!(with(|rig| rig.camera.k3 = 0.1), Some("source.kind"));
     }
 }

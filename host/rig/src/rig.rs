@@ -42,7 +42,7 @@ pub struct LightGeometry {
     pub distance_m: f64,
 }
 
-/// A pinhole camera with optional radial distortion.
+/// A pinhole camera with optional distortion, in OpenCV's terms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraGeometry {
@@ -52,8 +52,11 @@ pub struct CameraGeometry {
     pub width_px: usize,
     /// Height of a frame, pixels.
     pub height_px: usize,
-    /// Focal length, pixels.
+    /// Focal length, pixels; where `focal_y_px` is given, along the rows: OpenCV's fx.
     pub focal_px: f64,
+    /// Focal length along the columns, pixels, where pixels are not square: OpenCV's fy.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focal_y_px: Option<f64>,
     /// Principal point (x, y), pixels; the centre of the top left pixel is (0.5, 0.5).
     pub centre_px: [f64; 2],
     /// Radial distortion, coefficient of r² (r in units of the focal length).
@@ -62,6 +65,15 @@ pub struct CameraGeometry {
     /// Radial distortion, coefficient of r⁴.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub k2: f64,
+    /// Radial distortion, coefficient of r⁶.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k3: f64,
+    /// Tangential distortion: x moves by 2·p1·x·y, y by p1·(r² + 2y²).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub p1: f64,
+    /// Tangential distortion: x moves by p2·(r² + 2x²), y by 2·p2·x·y.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub p2: f64,
 }
 
 /// Four bright lines on a dark desk, and the square sample inside them.
@@ -162,9 +174,13 @@ impl Rig {
                 width_px: px,
                 height_px: px,
                 focal_px: 1600.0 / 1024.0 * px as f64,
+                focal_y_px: None,
                 centre_px: [px as f64 / 2.0; 2],
                 k1: 0.0,
                 k2: 0.0,
+                k3: 0.0,
+                p1: 0.0,
+                p2: 0.0,
             },
             target: Target {
                 line_offset_mm: 335.0,

@@ -6,8 +6,11 @@ use gonia_pipeline::bracket::merge_files;
 use gonia_rig::{Frame, Rig};
 use std::path::{Path, PathBuf};
 
-/// The frame of a shot's files, in the order of its pulses: PNGs of raw counts, or one OpenEXR of
-/// linear radiance.
+/// What the names of frames end in.
+const KINDS: [&str; 4] = ["exr", "png", "tif", "tiff"];
+
+/// The frame of a shot's files, in the order of its pulses: PNGs or TIFFs of raw counts, or one
+/// OpenEXR of linear radiance.
 pub fn frame_of(rig: &Rig, files: &[PathBuf], pulses: &[Pulse]) -> Result<Frame, CameraError> {
     if let [file] = files
         && is_exr(file)
@@ -20,7 +23,7 @@ pub fn frame_of(rig: &Rig, files: &[PathBuf], pulses: &[Pulse]) -> Result<Frame,
         .map(|pulse| pulse.exposure_s)
         .zip(files.iter().cloned())
         .collect();
-    Ok(merge_files(rig, &bracket)?.frame)
+    Ok(merge_files(rig, &bracket)?.radiance.frame)
 }
 
 /// Whether a file is one that some program is still writing under another name, or none of a camera.
@@ -28,7 +31,7 @@ pub fn is_foreign(file: &Path) -> bool {
     let name = file.file_name().map(|n| n.to_string_lossy().into_owned());
     let hidden = name.is_none_or(|n| n.starts_with('.'));
     let extension = file.extension().and_then(|e| e.to_str());
-    hidden || !extension.is_some_and(|e| ["exr", "png"].contains(&&*e.to_ascii_lowercase()))
+    hidden || !extension.is_some_and(|e| KINDS.contains(&&*e.to_ascii_lowercase()))
 }
 
 fn is_exr(file: &Path) -> bool {

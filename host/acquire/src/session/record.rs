@@ -5,7 +5,7 @@
 //! | 4 | `GFR1` |
 //! | 4, 1 | number of the frame; role: 0 material, 1 reference |
 //! | 1 | 0 by its marks; 1 by its pose; 2 refused |
-//! | 1, 8, 8 | why it was not by its marks: 0 –, 1 lines missing (found), 2 wrong layout (pixels, deviations), 3 far from the pose (degrees) |
+//! | 1, 8, 8 | why it was not by its marks: 0 –, 1 lines missing (found), 2 wrong layout (pixels, deviations), 3 far from the pose (degrees), 4 displaced (pixels right, down), 5 turned (place in `Turn::ALL`) |
 //! | 3 × 8 | residual, pixels; offset of the camera's θ and φ, degrees |
 //! | 6 × 8 | reading: θi, φi, θv, φv; the camera by its marks: θ, φ; radians |
 //! | 4 | number of points |
@@ -14,7 +14,7 @@
 //! | 4, n | bytes of the mask, and the mask (as in masks.csv); none when nothing was hidden |
 
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::{LeftOut, Mask, PoseOffset, RegistrationFailure};
+use gonia_imaging::{LeftOut, Mask, PoseOffset, RegistrationFailure, Turn};
 use gonia_pipeline::process::{FrameReport, Outcome, Refusal, SampledFrame, SampledPoint};
 use gonia_rig::Role;
 
@@ -37,8 +37,8 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
         Outcome::Locked => (0, None),
         Outcome::FellBack(reason) => (1, Some(reason)),
         Outcome::Refused(Refusal::NotTheTarget(reason)) => (2, Some(reason)),
-        // Found out only when all frames are there.
-        Outcome::Refused(Refusal::NoReference) => (2, None),
+        // Found out only when all frames are there, and of frames from files.
+        Outcome::Refused(Refusal::NoReference | Refusal::Unusable) => (2, None),
     };
     let (why, a, b) = match reason {
         None => (0, 0.0, 0.0),
@@ -48,6 +48,11 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
             deviation,
         }) => (2, misfit_px, deviation),
         Some(RegistrationFailure::FarFromPose { offset_deg }) => (3, offset_deg, 0.0),
+        Some(RegistrationFailure::Displaced { shift_px: [x, y] }) => (4, x, y),
+        Some(RegistrationFailure::Turned(turn)) => {
+            let place = Turn::ALL.iter().position(|t| *t == turn);
+            (5, place.unwrap_or(0) as f64, 0.0)
+        }
     };
     out.extend([outcome, why]);
     let Pose { light, view } = frame.reading;
@@ -110,6 +115,8 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
             deviation: b,
         }),
         3 => Some(RegistrationFailure::FarFromPose { offset_deg: a }),
+        4 => Some(RegistrationFailure::Displaced { shift_px: [a, b] }),
+        5 => Some(RegistrationFailure::Turned(*Turn::ALL.get(a as usize)?)),
         _ => return None,
     };
     let outcome = match (outcome, reason) {
@@ -231,6 +238,12 @@ pub(crate) mod tests {
         for outcome in [
             Outcome::Locked,
             Outcome::FellBack(RegistrationFailure::LinesMissing { found: 2 }),
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Displaced {
+                shift_px: [-2.5, 0.25],
+            })),
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Turned(
+                Turn::Transverse,
+            ))),
             Outcome::Refused(Refusal::NotTheTarget(reason)),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::FarFromPose {
                 offset_deg: 3.0,

@@ -5,10 +5,12 @@
 
 mod demosaic;
 mod merge;
+mod mosaic;
 #[cfg(test)]
 mod tests;
 
 pub use merge::Linearity;
+pub use mosaic::{Diagonal, MosaicDoubt, mosaic_doubt};
 
 use gonia_rig::{Frame, RawFrame, Sensor};
 
@@ -27,7 +29,8 @@ pub struct Radiance {
     pub linearity: Option<Linearity>,
 }
 
-/// Merges exposures (seconds, counts) of the same size; there must be at least one.
+/// Merges exposures (seconds, counts) of the same size and number of channels; there must be at least
+/// one.
 pub fn merge_bracket(exposures: &[(f64, RawFrame)], sensor: &Sensor) -> Radiance {
     let mut sorted: Vec<&(f64, RawFrame)> = exposures.iter().collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

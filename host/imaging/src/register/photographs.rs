@@ -87,6 +87,7 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
                 centre_px: photograph.centre_px,
                 k1: -0.2904,
                 k2: 0.1048,
+                ..Rig::paper(frame.width).camera
             },
             target: TARGET,
             ..Rig::paper(frame.width)

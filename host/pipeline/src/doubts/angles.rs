@@ -39,7 +39,7 @@ pub(super) fn in_radians(samples: &[Sample]) -> Result<Option<Remark>, Error> {
     // Azimuths were wrapped as degrees.
     let azimuth = largest(|s| size(s.phi_i_deg).max(size(s.phi_v_deg)));
     let count = different(samples, |s| [s.phi_i_deg, s.phi_v_deg]);
-    if azimuth > TAU + ROUNDING || azimuth < PI - 0.2 || count < 2 * MANY_ANGLES {
+    if !(PI - 0.2..=TAU + ROUNDING).contains(&azimuth) || count < 2 * MANY_ANGLES {
         return Ok(None);
     }
     Ok(Some(Remark::new(

@@ -36,6 +36,9 @@ pub enum Refusal {
     /// It does not show the target where the pose puts it.
     #[error("it does not show the target where its pose puts it: {0}")]
     NotTheTarget(RegistrationFailure),
+    /// Its files cannot be read or are not of the rig's camera: the remark that names it says why.
+    #[error("it cannot be read or is not of this rig's camera")]
+    Unusable,
     /// No usable frame of the reference was taken at its pose.
     #[error("no usable frame of the reference was taken at its pose")]
     NoReference,

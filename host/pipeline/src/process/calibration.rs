@@ -8,12 +8,13 @@ use crate::process::ReferenceSummary;
 use crate::process::account::LeftOutCounts;
 use crate::process::central::{CentralField, fit_central};
 use crate::process::coverage::{CoverageError, check_central, check_matches};
+use crate::process::linearity;
 use crate::process::masks::Masks;
 use crate::process::reference::{ReferenceFrame, References};
 use crate::process::reflectance::KnownReference;
 use gonia_brdf::{Pose, Vec3};
 use gonia_imaging::Mask;
-use gonia_rig::{FrameRow, Rig};
+use gonia_rig::{FrameRow, Remark, Rig};
 
 /// How light and beam were divided out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +114,17 @@ impl Calibrator {
                 .map(Mask::bytes)
                 .sum(),
             central: self.central,
+        }
+    }
+
+    /// What speaks against radiance that is proportional to light. `centre` is as in
+    /// [`Calibrator::new`].
+    pub fn doubt(&self, rig: &Rig, centre: usize) -> Option<Remark> {
+        match &self.method {
+            Method::Known(reference) => {
+                linearity::doubt(rig, self.references.frames(), reference, centre)
+            }
+            Method::Unknown(_) | Method::Geometric => None,
         }
     }
 

@@ -7,9 +7,11 @@ pub mod account;
 mod calibration;
 pub mod central;
 pub mod coverage;
+mod linearity;
 pub mod masks;
 mod reference;
 mod reflectance;
+mod remarks;
 pub mod sampled;
 pub mod source;
 
@@ -25,9 +27,10 @@ use gonia_brdf::direction::local_direction;
 use gonia_brdf::{Direction, Sample};
 use gonia_formats::FileError;
 use gonia_imaging::{IdealLight, SamplingGrid};
-use gonia_rig::{Frame, Rig};
+use gonia_rig::{Frame, Remark, Rig};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
+use remarks::HeardRemarks;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -57,6 +60,9 @@ pub struct Processed {
     pub reference: ReferenceSummary,
     /// What hid the target in the reference's frames.
     pub masks: Masks,
+    /// What is to be said of frames: which cannot be read, and which are used although something speaks
+    /// against them.
+    pub remarks: Vec<Remark>,
 }
 
 /// What the reference's frames gave.
@@ -81,7 +87,7 @@ pub enum ProcessError {
         /// Rows of the source.
         rows: usize,
     },
-    /// A frame could not be read.
+    /// None of the frames could be read; the first one.
     #[error("frame {frame}: {source}")]
     Load {
         /// Its number.
@@ -89,7 +95,7 @@ pub enum ProcessError {
         /// What is wrong, and with which file.
         source: FileError,
     },
-    /// A frame is not of the size that the rig's camera has.
+    /// No frame is of the size that the rig's camera has; the first one.
     #[error(
         "frame {frame} ({file}) has {width} x {height} pixels, but the camera of rig.toml has {rig_width} x {rig_height}: correct width_px, height_px, focal_px and centre_px, or the file"
     )]
@@ -109,11 +115,13 @@ pub enum ProcessError {
     },
     /// There are frames of the reference, and none of them is any good.
     #[error(
-        "none of the {refused} frames of the reference shows the target where its pose puts it: check rig.toml and the poses in frames.csv, or leave the reference's rows out to use an ideal light instead"
+        "none of the {refused} frames of the reference shows the target where its pose puts it ({why}): check rig.toml and the poses in frames.csv, or leave the reference's rows out to use an ideal light instead"
     )]
     ReferenceRefused {
         /// Frames of the reference.
         refused: usize,
+        /// What was found in the first of them.
+        why: String,
     },
     /// Eq. (3) needs more of the reference than was measured.
     #[error(transparent)]
@@ -132,9 +140,12 @@ const BATCH: usize = 256;
 /// material's own frame tells what hid it. `progress` hears the stage and the frames done in it, from
 /// any thread, and ends the work by a break.
 ///
+/// A frame that cannot be read or is of another size is refused, with a remark that names it, and the
+/// others are used.
+///
 /// # Errors
-/// No frame of the material, a frame that cannot be read or is of another size, no good frame of the
-/// reference, or too few of an unknown one.
+/// No frame of the material, none of a role that can be read and is of the right size, no good frame of
+/// the reference, or too few of an unknown one.
 pub fn process(
     rig: &Rig,
     source: &dyn FrameSource,
@@ -142,11 +153,19 @@ pub fn process(
     progress: Heard<'_>,
 ) -> Result<Processed, ProcessError> {
     let sampler = FrameSampler::new(rig);
-    let sampled = |row: &FrameRow, hidden: Hidden| {
-        let frame = load(rig, source, row)?;
-        Ok(sampler.sample(&frame, row, hidden))
+    let heard = HeardRemarks::default();
+    let sampled = |row: &FrameRow, hidden: Hidden| match load(rig, source, row) {
+        Ok((frame, remarks)) => {
+            heard.of_frame(row, remarks);
+            Ok(sampler.sample(&frame, row, hidden))
+        }
+        Err(error) => {
+            heard.unusable(row, error);
+            Ok(SampledFrame::refused(row, Refusal::Unusable))
+        }
     };
-    process_sampled(rig, source.rows(), &sampled, masks, progress)
+    let processed = process_sampled(rig, source.rows(), &sampled, masks, progress);
+    heard.judge(source.rows(), processed)
 }
 
 /// Hears the stage and the frames done in it.
@@ -190,8 +209,14 @@ pub fn process_sampled(
         },
     )?;
     if references.is_empty() && !reference.is_empty() {
-        let refused = reference.len();
-        return Err(ProcessError::ReferenceRefused { refused });
+        let why = frames.iter().find_map(|frame| match frame.outcome {
+            Outcome::Refused(Refusal::NotTheTarget(reason)) => Some(reason.to_string()),
+            _ => None,
+        });
+        return Err(ProcessError::ReferenceRefused {
+            refused: reference.len(),
+            why: why.unwrap_or_else(|| "they cannot be read".to_owned()),
+        });
     }
     let calibrator = Calibrator::new(
         rig,
@@ -219,13 +244,22 @@ pub fn process_sampled(
         frames,
         left_out,
         reference: calibrator.summary(),
+        remarks: calibrator
+            .doubt(rig, bench.grid.centre())
+            .into_iter()
+            .collect(),
         masks: calibrator.into_masks(),
     })
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.
-fn load(rig: &Rig, source: &dyn FrameSource, row: &FrameRow) -> Result<Frame, ProcessError> {
-    let frame = source.load(row).map_err(|source| ProcessError::Load {
+fn load(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    row: &FrameRow,
+) -> Result<(Frame, Vec<Remark>), ProcessError> {
+    let loaded = source.load_with_remarks(row);
+    let (frame, remarks) = loaded.map_err(|source| ProcessError::Load {
         frame: row.frame,
         source,
     })?;
@@ -240,7 +274,7 @@ fn load(rig: &Rig, source: &dyn FrameSource, row: &FrameRow) -> Result<Frame, Pr
             rig_height: camera.height_px,
         });
     }
-    Ok(frame)
+    Ok((frame, remarks))
 }
 
 /// What every frame needs.

@@ -1,9 +1,11 @@
 //! A frame once it has been registered and sampled: all that the samples need of it, at a hundredth
 //! of its size. A session keeps these as its frames arrive.
 
-use crate::process::account::{FrameReport, Outcome};
+use crate::process::account::{FrameReport, Outcome, Refusal};
 use gonia_brdf::{Direction, Pose};
-use gonia_imaging::{LeftOut, Mask, Registrar, Registration, SamplingGrid, find_occlusion};
+use gonia_imaging::{
+    LeftOut, Mask, PoseOffset, Registrar, Registration, SamplingGrid, find_occlusion,
+};
 use gonia_rig::{Frame, FrameRow, Rig};
 
 /// What one grid point shows.
@@ -28,6 +30,25 @@ pub struct SampledFrame {
     pub points: Vec<Result<SampledPoint, LeftOut>>,
     /// What hid the target, where that was looked for in this frame.
     pub mask: Option<Mask>,
+}
+
+impl SampledFrame {
+    /// A frame that is not used, whatever it shows.
+    pub fn refused(row: &FrameRow, refusal: Refusal) -> Self {
+        Self {
+            report: FrameReport {
+                frame: row.frame,
+                role: row.role,
+                outcome: Outcome::Refused(refusal),
+                residual_px: 0.0,
+                pose_offset: PoseOffset::default(),
+            },
+            reading: row.pose,
+            view: row.pose.view,
+            points: Vec::new(),
+            mask: None,
+        }
+    }
 }
 
 /// How it is known what hides the target in a frame.

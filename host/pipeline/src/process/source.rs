@@ -1,8 +1,8 @@
 //! Where frames come from.
 
-use crate::bracket::load_bracket;
+use crate::bracket::{Bracket, load_bracket};
 use gonia_formats::{CaptureFolder, FileError};
-use gonia_rig::Frame;
+use gonia_rig::{Frame, Remark};
 
 pub use gonia_rig::{FrameRow, Role};
 
@@ -13,6 +13,14 @@ pub trait FrameSource: Sync {
 
     /// One of them. May be called more than once for the same row.
     fn load(&self, row: &FrameRow) -> Result<Frame, FileError>;
+
+    /// As [`FrameSource::load`], with what is to be said of a frame that is used all the same.
+    ///
+    /// # Errors
+    /// As [`FrameSource::load`].
+    fn load_with_remarks(&self, row: &FrameRow) -> Result<(Frame, Vec<Remark>), FileError> {
+        Ok((self.load(row)?, Vec::new()))
+    }
 }
 
 impl FrameSource for CaptureFolder {
@@ -21,10 +29,14 @@ impl FrameSource for CaptureFolder {
     }
 
     fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
+        Ok(self.load_with_remarks(row)?.0)
+    }
+
+    fn load_with_remarks(&self, row: &FrameRow) -> Result<(Frame, Vec<Remark>), FileError> {
         if self.exposures(row).is_empty() {
-            self.load(row)
-        } else {
-            load_bracket(self, row).map(|radiance| radiance.frame)
+            return Ok((self.load(row)?, Vec::new()));
         }
+        let Bracket { radiance, remarks } = load_bracket(self, row)?;
+        Ok((radiance.frame, remarks))
     }
 }
