@@ -97,6 +97,7 @@ fn note(scale: Scale) -> SampleNote {
     }
 }
 
+// long: a list of cases, one after the other
 fn scales(bench: &mut Bench) {
     let samples = samples();
     let half = &samples[..samples.len() / 2];
@@ -210,6 +211,7 @@ fn scales(bench: &mut Bench) {
     );
 }
 
+// long: a list of cases, one after the other
 fn figures(bench: &mut Bench) {
     let folder = bench.at("folder");
     fs::create_dir(&folder).unwrap();

@@ -49,6 +49,7 @@ mod npy_type;
 mod odd_samples;
 pub mod photo;
 pub mod plan_csv;
+mod raw_file;
 pub mod raw_frame;
 mod raw_png;
 mod raw_tiff;

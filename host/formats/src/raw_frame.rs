@@ -1,23 +1,14 @@
 //! Raw frames as a sensor gives them: counts, in a grey or RGB PNG or TIFF of 8 or 16 bits a channel.
 
+pub use crate::raw_file::RawFile;
+
+use crate::raw_file::camera_raw;
 use crate::{FileError, raw_png, raw_tiff};
 use gonia_rig::RawFrame;
 use png::{BitDepth, ColorType};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-
-/// A raw frame, and what its file says of the counts.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RawFile {
-    /// The counts.
-    pub raw: RawFrame,
-    /// Bits of a count in the file: 8 or 16.
-    pub bits: u8,
-    /// Why the counts are not proportional to light, where the file says so (in words): by the chunks
-    /// sRGB, gAMA, iCCP or cICP of a PNG, or the colour profile of a TIFF.
-    pub encoded: Option<String>,
-}
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
@@ -84,27 +75,6 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
         .read_to_end(&mut head)
         .map_err(|error| reading(&error))?;
     Ok(head)
-}
-
-/// A file as cameras write it, which is not read.
-pub(super) fn camera_raw(path: &Path, kind: &str) -> FileError {
-    FileError::new(
-        path,
-        format_args!("is a {kind}, which is not read"),
-        "make a TIFF of its counts, as the sensor gave them and not turned: dcraw -D -4 -t 0 -T",
-    )
-}
-
-/// A frame of another camera.
-pub(super) fn wrong_size(path: &Path, seen: [usize; 2], camera: [usize; 2]) -> FileError {
-    FileError::new(
-        path,
-        format_args!(
-            "is {} × {} pixels, but the rig's camera has {} × {}",
-            seen[0], seen[1], camera[0], camera[1]
-        ),
-        "mend [camera] in rig.toml or use the frames of this rig",
-    )
 }
 
 /// Writes a raw frame whole, as a PNG of 16 bits.

@@ -1,6 +1,6 @@
 //! Raw exposures as PNG: grey or RGB of 8 or 16 bits.
 
-use crate::raw_frame::{RawFile, wrong_size};
+use crate::raw_file::{RawFile, wrong_size};
 use crate::{FileError, encoding};
 use gonia_rig::RawFrame;
 use png::{BitDepth, ColorType, Info};

@@ -1,6 +1,6 @@
 //! Raw exposures as TIFF: grey or RGB of 8 or 16 bits, one image a file.
 
-use crate::raw_frame::{RawFile, wrong_size};
+use crate::raw_file::{RawFile, wrong_size};
 use crate::{FileError, encoding};
 use gonia_rig::RawFrame;
 use std::fs::File;
@@ -49,7 +49,7 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
     if let Some(code) = unsigned(&mut decoder, Tag::PhotometricInterpretation)?
         && CFA.contains(&code)
     {
-        return Err(crate::raw_frame::camera_raw(
+        return Err(crate::raw_file::camera_raw(
             path,
             "camera raw file (DNG or alike)",
         ));

@@ -212,6 +212,7 @@ mod tests {
     use super::super::{Data, FillSettings, fill, select};
     use crate::bins::Bins;
     use crate::direction::{Direction, dot};
+    use crate::elementary::Elementary;
     use crate::grid::Grid;
     use crate::progress::silent;
     use crate::random::Random;
