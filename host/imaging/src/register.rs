@@ -129,6 +129,15 @@ pub enum RegistrationFailure {
         /// How far right and down of its place the target is, pixels.
         shift_px: [f64; 2],
     },
+    /// The lines found are those of the target, but the camera is rolled.
+    #[error(
+        "the target is seen turned by {:.2} degrees {} from there",
+        .roll_deg.abs(), if *.roll_deg > 0.0 { "clockwise" } else { "anticlockwise" }
+    )]
+    Rolled {
+        /// Turn about the optical axis, clockwise, degrees.
+        roll_deg: f64,
+    },
     /// The lines are where they should be once the frame is turned back.
     #[error("the frame is {0}")]
     Turned(Turn),
@@ -235,7 +244,16 @@ impl Registrar {
             .into_iter()
             .find_map(|within| self.displacement(frame, view, predicted, within));
         match found {
-            Some(shift_px) => RegistrationFailure::Displaced { shift_px },
+            Some(CameraShift { shift_px, roll, .. }) => {
+                // What moves the fiducial lines more.
+                let by_roll = roll.abs() * predicted_radius_px(predicted, &self.target);
+                if by_roll > shift_px[0].hypotenuse(shift_px[1]) {
+                    let roll_deg = roll.to_degrees();
+                    RegistrationFailure::Rolled { roll_deg }
+                } else {
+                    RegistrationFailure::Displaced { shift_px }
+                }
+            }
             None => failure,
         }
     }
@@ -415,15 +433,15 @@ impl Registrar {
         self.estimate(view, strips, lines, &trust)
     }
 
-    /// How far the whole target is from its place, where it is within so many frame widths: a camera
-    /// whose image is moved (and turned a little) must see all four lines.
+    /// How the whole target is moved and turned from its place, where it is within so many frame widths: a
+    /// camera whose image is moved (and turned a little) must see all four lines.
     fn displacement(
         &self,
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
         within_widths: f64,
-    ) -> Option<[f64; 2]> {
+    ) -> Option<CameraShift> {
         let trust = Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
@@ -457,7 +475,7 @@ impl Registrar {
             let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
             let estimate = self.estimate(view, &strips, &lines, &trust);
             let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
-            fits.then_some(estimate.shift.shift_px)
+            fits.then_some(estimate.shift)
         })
     }
 
@@ -708,6 +726,12 @@ fn crossing(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     let g = [b[0][0] - a[0][0], b[0][1] - a[0][1]];
     let t = (g[0] * e[1] - g[1] * e[0]) / det;
     Some([a[0][0] + t * d[0], a[0][1] + t * d[1]])
+}
+
+/// Half the distance on the frame between two opposite fiducial lines.
+fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
+    let [a, b] = [-1.0, 1.0].map(|side| predicted.apply([side * target.line_offset_mm, 0.0]));
+    0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
 }
 
 #[cfg(test)]

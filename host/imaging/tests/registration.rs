@@ -312,3 +312,52 @@ fn a_target_that_is_elsewhere_in_the_frame_is_not_kept_by_its_pose() {
     assert!(kept.is_empty(), "{kept:#?}");
     assert!(4 * named >= 3 * frames, "{named} of {frames}");
 }
+
+/// The frame turned clockwise about its middle, between pixels.
+fn rolled(frame: &Frame, roll_deg: f64) -> Frame {
+    let (sin, cos) = roll_deg.to_radians().sine_cosine();
+    let middle = [0.5 * frame.width as f64, 0.5 * frame.height as f64];
+    let pixel = |i: usize| {
+        let from = [(i % frame.width) as f64, (i / frame.width) as f64];
+        let [right, down] = [0, 1].map(|k| from[k] + 0.5 - middle[k]);
+        let at = [cos * right + sin * down, cos * down - sin * right];
+        let [x, y] = [0, 1].map(|k| at[k] + middle[k] - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let mut rgb = [0.0; 3];
+        for (column, row, weight) in [
+            (x0, y0, (x0 + 1.0 - x) * (y0 + 1.0 - y)),
+            (x0 + 1.0, y0, (x - x0) * (y0 + 1.0 - y)),
+            (x0, y0 + 1.0, (x0 + 1.0 - x) * (y - y0)),
+            (x0 + 1.0, y0 + 1.0, (x - x0) * (y - y0)),
+        ] {
+            let column = column.clamp(0.0, (frame.width - 1) as f64) as usize;
+            let row = row.clamp(0.0, (frame.height - 1) as f64) as usize;
+            for (sum, value) in rgb.iter_mut().zip(frame.rgb[row * frame.width + column]) {
+                *sum += weight as f32 * value;
+            }
+        }
+        rgb
+    };
+    Frame {
+        rgb: (0..frame.rgb.len()).map(pixel).collect(),
+        ..*frame
+    }
+}
+
+#[test]
+fn a_camera_that_is_rolled_is_said_to_be_and_by_how_much() {
+    // Not near the zenith, where a roll and an azimuth are alike.
+    let scene = Scene::of_fabric(400);
+    let registrar = Registrar::new(&scene.geometry.to_rig());
+    for (roll_deg, [tv, pv]) in [(0.7, [30.0, 20.0]), (-0.7, [45.0, 200.0]), (1.5, [60.0, 90.0])] {
+        let pose = Pose::from_deg([30.0, 140.0, tv, pv]);
+        let frame = rolled(&scene.frame(Role::Material, pose, 1), roll_deg);
+        let found = registrar.register(&frame, pose);
+        let RegistrationState::FellBack(RegistrationFailure::Rolled { roll_deg: said }) =
+            found.state
+        else {
+            panic!("{roll_deg}, {tv}: {:?}", found.state);
+        };
+        assert!((said - roll_deg).abs() < 0.02, "{said} for {roll_deg}");
+    }
+}

@@ -53,6 +53,7 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
             let place = Turn::ALL.iter().position(|t| *t == turn);
             (5, place.unwrap_or(0) as f64, 0.0)
         }
+        Some(RegistrationFailure::Rolled { roll_deg }) => (6, roll_deg, 0.0),
     };
     out.extend([outcome, why]);
     let Pose { light, view } = frame.reading;
@@ -117,6 +118,7 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
         3 => Some(RegistrationFailure::FarFromPose { offset_deg: a }),
         4 => Some(RegistrationFailure::Displaced { shift_px: [a, b] }),
         5 => Some(RegistrationFailure::Turned(*Turn::ALL.get(a as usize)?)),
+        6 => Some(RegistrationFailure::Rolled { roll_deg: a }),
         _ => return None,
     };
     let outcome = match (outcome, reason) {
@@ -244,6 +246,9 @@ pub(crate) mod tests {
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Turned(
                 Turn::Transverse,
             ))),
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Rolled {
+                roll_deg: -0.7,
+            })),
             Outcome::Refused(Refusal::NotTheTarget(reason)),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::FarFromPose {
                 offset_deg: 3.0,
