@@ -349,7 +349,11 @@ fn a_camera_that_is_rolled_is_said_to_be_and_by_how_much() {
     // Not near the zenith, where a roll and an azimuth are alike.
     let scene = Scene::of_fabric(400);
     let registrar = Registrar::new(&scene.geometry.to_rig());
-    for (roll_deg, [tv, pv]) in [(0.7, [30.0, 20.0]), (-0.7, [45.0, 200.0]), (1.5, [60.0, 90.0])] {
+    for (roll_deg, [tv, pv]) in [
+        (0.7, [30.0, 20.0]),
+        (-0.7, [45.0, 200.0]),
+        (1.5, [60.0, 90.0]),
+    ] {
         let pose = Pose::from_deg([30.0, 140.0, tv, pv]);
         let frame = rolled(&scene.frame(Role::Material, pose, 1), roll_deg);
         let found = registrar.register(&frame, pose);

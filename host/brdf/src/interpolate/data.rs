@@ -43,7 +43,7 @@ impl<'a> Data<'a> {
         let data = half_of_data(bins, one_in, coordinates);
         Self {
             bins,
-            hierarchy: Hierarchy::with_values(data, one_in, Some(bins)),
+            hierarchy: Hierarchy::with_mirror_images(data, one_in),
             coordinates,
             one_bin_in: one_in,
         }

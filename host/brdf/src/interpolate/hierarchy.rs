@@ -9,8 +9,6 @@
 
 use super::coordinates::{Point, distance2};
 use super::datum::{Datum, SIGMA_PER_MAD, merge};
-use super::low_signal::linearize;
-use crate::bins::Bins;
 use crate::quantile::median;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
@@ -46,7 +44,6 @@ pub struct Hierarchy {
     /// Middles of the groups of merged data.
     middles: Vec<Point>,
     tree: Option<ImmutableKdTree<f32, 6>>,
-    noise_variance: Option<f32>,
 }
 
 /// A neighbour: squared distance and number of the datum.
@@ -68,7 +65,7 @@ pub trait Neighbours {
 impl Hierarchy {
     /// Sorts and merges the data.
     pub fn new(data: Vec<Datum>) -> Self {
-        let (bins, starts, _) = in_order(data, 1, None);
+        let (bins, starts) = in_order(data, 1);
         Self::sorted(bins, starts, false)
     }
 
@@ -76,28 +73,14 @@ impl Hierarchy {
     /// of a datum is to be in the half itself.
     /// Each datum stands for `stands_for` bins, and so fewer are merged.
     pub fn with_mirror_images(half: Vec<Datum>, stands_for: usize) -> Self {
-        Self::with_values(half, stands_for, None)
-    }
-
-    /// The same. With `values`, the bins that the data came from, logarithms are replaced where the signal is below
-    /// the noise; the variance of one sample's, where these are most, is [`Self::noise_variance`].
-    pub(super) fn with_values(half: Vec<Datum>, stands_for: usize, values: Option<&Bins>) -> Self {
-        let (mut bins, mut starts, noise_variance) = in_order(half, stands_for, values);
+        let (mut bins, mut starts) = in_order(half, stands_for);
         let n = bins.len();
         append_mirror_images(&mut bins);
         starts.pop();
         let images: Vec<u32> = starts.iter().map(|start| start + n as u32).collect();
         starts.extend(images);
         starts.push(2 * n as u32);
-        Self {
-            noise_variance,
-            ..Self::sorted(bins, starts, true)
-        }
-    }
-
-    /// Variance of the logarithm of one sample where most have a signal below the noise; `None` elsewhere.
-    pub fn noise_variance(&self) -> Option<f32> {
-        self.noise_variance
+        Self::sorted(bins, starts, true)
     }
 
     /// The same data at other places. What is near in one system of coordinates is near in
@@ -140,7 +123,6 @@ impl Hierarchy {
             mirrored,
             middles,
             tree,
-            noise_variance: None,
         }
     }
 
@@ -237,21 +219,16 @@ pub fn keep_nearest(found: &mut Vec<Found>, n: usize) -> f32 {
 }
 
 /// Sorts data so that neighbours follow each other. Also where those that are to be merged start, and the
-/// end of the last; and the noise, see [`linearize`].
-fn in_order(
-    mut data: Vec<Datum>,
-    stands_for: usize,
-    values: Option<&Bins>,
-) -> (Vec<Datum>, Vec<u32>, Option<f32>) {
+/// end of the last.
+fn in_order(mut data: Vec<Datum>, stands_for: usize) -> (Vec<Datum>, Vec<u32>) {
     let merged = (data.len() * stands_for / MERGE).min(data.len());
     let depth = merged.max(1).ilog2();
     split(&mut data, depth);
     let mut starts = Vec::with_capacity((1 << depth) + 1);
     push_starts(0, data.len(), depth, &mut starts);
     starts.push(data.len() as u32);
-    let noise_variance = values.and_then(|bins| linearize(&mut data, &starts, bins));
     down_weight_outliers(&mut data, &starts);
-    (data, starts, noise_variance)
+    (data, starts)
 }
 
 /// Sorts data by halving `depth` times along the widest axis.

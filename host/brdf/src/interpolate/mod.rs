@@ -21,7 +21,6 @@ pub mod exponential;
 pub mod fill;
 pub mod from_corners;
 pub mod hierarchy;
-mod low_signal;
 pub mod origin;
 pub mod patches;
 pub(crate) mod planes;

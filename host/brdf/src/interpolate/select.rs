@@ -48,8 +48,7 @@ pub fn select(data: &Data, base: FillSettings) -> Selection {
         one_bin_in: data.one_bin_in(),
         ..base
     };
-    let low_signal = data.hierarchy().noise_variance();
-    if let Some(variance) = low_signal.or(bins.noise_variance()) {
+    if let Some(variance) = bins.noise_variance() {
         settings.noise_variance = variance;
     }
     let comparison = Comparison::of(bins, base);
