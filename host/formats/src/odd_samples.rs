@@ -136,6 +136,6 @@ mod tests {
             said.ends_with("exchange the columns theta and phi"),
             "{said}"
         );
-        assert!(read("").unwrap().samples.is_empty());
+        assert!(read("").unwrap_err().contains("has no rows"));
     }
 }
