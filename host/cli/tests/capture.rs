@@ -10,7 +10,9 @@ use gonia_acquire::session::verify;
 use session::{small_rig, write_small};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+#[cfg(unix)]
+use std::time::Duration;
+use std::time::Instant;
 
 fn start(folder: &Path, resume: bool) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gonia"));

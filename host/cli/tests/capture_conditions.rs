@@ -4,19 +4,18 @@
 #[path = "common/session.rs"]
 mod session;
 
-use gonia_acquire::camera::{Camera, CameraError, CommandCamera, Pulse, RenderingCamera};
+use gonia_acquire::camera::{Camera, CameraError, Pulse, RenderingCamera};
 use gonia_acquire::capture::{
     Arms, Ended, Orders, SessionEvent, UnattendedSession, Watch, free_mb,
 };
 use gonia_acquire::session::{SessionEnd, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
-use gonia_rig::{Frame, FrameRow, Rig, Thermometer};
+use gonia_rig::{Frame, FrameRow, Rig};
 use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
 use gonia_sim::rig::SimRig;
 use session::{begin, small_rig};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 const POSES: usize = 12;
@@ -419,171 +418,178 @@ fn a_session_goes_on_by_itself_when_a_full_disk_has_room_again() {
     );
 }
 
-/// Somebody who opens the window when it is too warm.
-struct Airing<'a> {
-    reading: &'a Path,
-    heard: Mutex<Vec<String>>,
-    degrees: &'a str,
-}
+/// With programs that stand in for a thermometer and a camera: shell scripts.
+#[cfg(unix)]
+mod programs {
+    use super::*;
+    use gonia_acquire::camera::CommandCamera;
+    use gonia_rig::Thermometer;
+    use std::sync::Mutex;
 
-impl Watch for Airing<'_> {
-    fn on_event(&self, event: &SessionEvent) {
-        match event {
-            // Warm after the third pose.
-            SessionEvent::Pose { done, .. } if done.index == 2 => {
-                std::fs::write(self.reading, "31.5").unwrap();
+    /// Somebody who opens the window when it is too warm.
+    struct Airing<'a> {
+        reading: &'a Path,
+        heard: Mutex<Vec<String>>,
+        degrees: &'a str,
+    }
+
+    impl Watch for Airing<'_> {
+        fn on_event(&self, event: &SessionEvent) {
+            match event {
+                // Warm after the third pose.
+                SessionEvent::Pose { done, .. } if done.index == 2 => {
+                    std::fs::write(self.reading, "31.5").unwrap();
+                }
+                SessionEvent::Note(text) => {
+                    self.heard.lock().unwrap().push((*text).to_owned());
+                    std::fs::write(self.reading, self.degrees).unwrap();
+                }
+                _ => {}
             }
-            SessionEvent::Note(text) => {
-                self.heard.lock().unwrap().push((*text).to_owned());
-                std::fs::write(self.reading, self.degrees).unwrap();
-            }
-            _ => {}
         }
     }
-}
 
-#[test]
-#[cfg(unix)]
-fn a_session_waits_while_it_is_too_warm_and_looks_at_the_control_pose_after_it() {
-    for (degrees, end, looks) in [
-        ("22", SessionEnd::Finished, 1),
-        ("31.4", SessionEnd::Failed, 3),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
-        let place = tempfile::tempdir().unwrap();
-        let reading = place.path().join("degrees");
-        std::fs::write(&reading, "21.5").unwrap();
-        let mut rig = small_rig();
-        let settings = rig.session.as_mut().unwrap();
-        (settings.reference, settings.control_every) = (false, 1000);
-        settings.thermometer = Some(Thermometer {
-            run: vec!["cat".into(), reading.to_str().unwrap().into()],
-            limits_c: [18.0, 26.0],
-            every_s: 0.0,
-        });
-        let writer = begin(folder.path(), &rig, POSES);
-        let airing = Airing {
-            reading: &reading,
-            heard: Mutex::default(),
-            degrees,
-        };
+    #[test]
+    fn a_session_waits_while_it_is_too_warm_and_looks_at_the_control_pose_after_it() {
+        for (degrees, end, looks) in [
+            ("22", SessionEnd::Finished, 1),
+            ("31.4", SessionEnd::Failed, 3),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let place = tempfile::tempdir().unwrap();
+            let reading = place.path().join("degrees");
+            std::fs::write(&reading, "21.5").unwrap();
+            let mut rig = small_rig();
+            let settings = rig.session.as_mut().unwrap();
+            (settings.reference, settings.control_every) = (false, 1000);
+            settings.thermometer = Some(Thermometer {
+                run: vec!["cat".into(), reading.to_str().unwrap().into()],
+                limits_c: [18.0, 26.0],
+                every_s: 0.0,
+            });
+            let writer = begin(folder.path(), &rig, POSES);
+            let airing = Airing {
+                reading: &reading,
+                heard: Mutex::default(),
+                degrees,
+            };
+            let orders = Orders::default();
+            let surroundings = Surroundings {
+                watch: &airing,
+                ..Surroundings::calm(&orders)
+            };
+            let none = FaultPlan::default();
+            let ended = run_with(folder.path(), writer, none, &surroundings, calm_camera);
+            assert_eq!(ended.end, end, "{}", ended.reason);
+            let heard = airing.heard.into_inner().unwrap();
+            assert_eq!(heard.len(), looks, "{heard:?}");
+            assert!(
+                heard[0].contains("31.5 degrees C, and 18 to 26"),
+                "{heard:?}"
+            );
+            let text = journal(folder.path());
+            if end == SessionEnd::Finished {
+                // Once after the warmth, once at the end.
+                assert_eq!(text.matches(" control ").count(), 2, "{text}");
+                assert_eq!(crcs(folder.path()).len(), POSES);
+            } else {
+                assert!(ended.reason.contains("31.4 degrees C"), "{}", ended.reason);
+            }
+        }
+    }
+
+    /// The samples of every pose, in order.
+    fn values(folder: &Path) -> Vec<Vec<Option<[f32; 3]>>> {
+        let session = SessionFolder::open(folder).unwrap();
+        let frames = session.done().map(|pose| session.frame(pose).unwrap());
+        frames
+            .map(|frame| {
+                frame
+                    .points
+                    .iter()
+                    .map(|p| p.as_ref().ok().map(|p| p.rgb))
+                    .collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_whole_session_whose_frames_a_program_takes() {
+        // What the program hands out: the frames of a session before.
+        let before = tempfile::tempdir().unwrap();
+        let writer = begin(before.path(), &small_rig(), POSES);
+        std::fs::create_dir(before.path().join("frames")).unwrap();
         let orders = Orders::default();
         let surroundings = Surroundings {
-            watch: &airing,
+            keep_frames: true,
             ..Surroundings::calm(&orders)
         };
         let none = FaultPlan::default();
-        let ended = run_with(folder.path(), writer, none, &surroundings, calm_camera);
-        assert_eq!(ended.end, end, "{}", ended.reason);
-        let heard = airing.heard.into_inner().unwrap();
-        assert_eq!(heard.len(), looks, "{heard:?}");
-        assert!(
-            heard[0].contains("31.5 degrees C, and 18 to 26"),
-            "{heard:?}"
-        );
-        let text = journal(folder.path());
-        if end == SessionEnd::Finished {
-            // Once after the warmth, once at the end.
-            assert_eq!(text.matches(" control ").count(), 2, "{text}");
-            assert_eq!(crcs(folder.path()).len(), POSES);
-        } else {
-            assert!(ended.reason.contains("31.4 degrees C"), "{}", ended.reason);
+        let ended = run_with(before.path(), writer, none, &surroundings, |rig, sim| {
+            Box::new(Troubled {
+                camera: RenderingCamera::new(rig, sim, 1, POSES, true),
+                trouble: quiet,
+                calls: 0,
+                first_pose: 0,
+                extra: 0,
+                changes: true,
+            })
+        });
+        assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
+
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = Some(begin(folder.path(), &small_rig(), POSES));
+        let frames = before.path().join("frames");
+        // It fails once in the middle of the material, and leaves nothing once.
+        let script = "n=$(printf %06d $2); cd \"$0\"; \
+            if [ $1$2 = material5 ] && mkdir failed; then exit 3; fi; \
+            if [ $1$2 = material6 ] && mkdir empty; then exit 0; fi; \
+            cp $1_$n.exr \"$3.exr\"";
+        let program = [
+            "sh",
+            "-c",
+            script,
+            frames.to_str().unwrap(),
+            "{role}",
+            "{index}",
+            "{file}",
+        ];
+        let mut retaken = 0;
+        for end in [SessionEnd::AwaitsMaterial, SessionEnd::Finished] {
+            let writer = match writer.take() {
+                Some(writer) => writer,
+                // The material lies there now.
+                None => SessionWriter::resume(folder.path()).unwrap().0,
+            };
+            let ended = run_with(
+                folder.path(),
+                writer,
+                FaultPlan::default(),
+                &Surroundings::calm(&orders),
+                |rig, _| {
+                    let program = program.map(str::to_owned).to_vec();
+                    Box::new(CommandCamera::new(rig, program, 20.0))
+                },
+            );
+            assert_eq!(ended.end, end, "{}", ended.reason);
+            retaken += ended.retaken;
         }
-    }
-}
-
-/// The samples of every pose, in order.
-fn values(folder: &Path) -> Vec<Vec<Option<[f32; 3]>>> {
-    let session = SessionFolder::open(folder).unwrap();
-    let frames = session.done().map(|pose| session.frame(pose).unwrap());
-    frames
-        .map(|frame| {
-            frame
-                .points
-                .iter()
-                .map(|p| p.as_ref().ok().map(|p| p.rgb))
-                .collect()
-        })
-        .collect()
-}
-
-#[test]
-#[cfg(unix)]
-fn a_whole_session_whose_frames_a_program_takes() {
-    // What the program hands out: the frames of a session before.
-    let before = tempfile::tempdir().unwrap();
-    let writer = begin(before.path(), &small_rig(), POSES);
-    std::fs::create_dir(before.path().join("frames")).unwrap();
-    let orders = Orders::default();
-    let surroundings = Surroundings {
-        keep_frames: true,
-        ..Surroundings::calm(&orders)
-    };
-    let none = FaultPlan::default();
-    let ended = run_with(before.path(), writer, none, &surroundings, |rig, sim| {
-        Box::new(Troubled {
-            camera: RenderingCamera::new(rig, sim, 1, POSES, true),
-            trouble: quiet,
-            calls: 0,
-            first_pose: 0,
-            extra: 0,
-            changes: true,
-        })
-    });
-    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
-
-    let folder = tempfile::tempdir().unwrap();
-    let mut writer = Some(begin(folder.path(), &small_rig(), POSES));
-    let frames = before.path().join("frames");
-    // It fails once in the middle of the material, and leaves nothing once.
-    let script = "n=$(printf %06d $2); cd \"$0\"; \
-        if [ $1$2 = material5 ] && mkdir failed; then exit 3; fi; \
-        if [ $1$2 = material6 ] && mkdir empty; then exit 0; fi; \
-        cp $1_$n.exr \"$3.exr\"";
-    let program = [
-        "sh",
-        "-c",
-        script,
-        frames.to_str().unwrap(),
-        "{role}",
-        "{index}",
-        "{file}",
-    ];
-    let mut retaken = 0;
-    for end in [SessionEnd::AwaitsMaterial, SessionEnd::Finished] {
-        let writer = match writer.take() {
-            Some(writer) => writer,
-            // The material lies there now.
-            None => SessionWriter::resume(folder.path()).unwrap().0,
-        };
-        let ended = run_with(
-            folder.path(),
-            writer,
-            FaultPlan::default(),
-            &Surroundings::calm(&orders),
-            |rig, _| {
-                let program = program.map(str::to_owned).to_vec();
-                Box::new(CommandCamera::new(rig, program, 20.0))
-            },
+        assert_eq!(retaken, 2);
+        let text = journal(folder.path());
+        assert!(
+            text.contains("the program sh ended with exit status: 3"),
+            "{text}"
         );
-        assert_eq!(ended.end, end, "{}", ended.reason);
-        retaken += ended.retaken;
-    }
-    assert_eq!(retaken, 2);
-    let text = journal(folder.path());
-    assert!(
-        text.contains("the program sh ended with exit status: 3"),
-        "{text}"
-    );
-    assert!(text.contains("left 0 files where 1 are due"), "{text}");
-    let (taken, given) = (values(folder.path()), values(before.path()));
-    assert_eq!((taken.len(), given.len()), (2 * POSES, 2 * POSES));
-    for (a, b) in taken.iter().flatten().zip(given.iter().flatten()) {
-        // Frames in files are half floats.
-        let near = match (a, b) {
-            (Some(a), Some(b)) => (0..3).all(|c| (a[c] / b[c] - 1.0).abs() < 1e-3),
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        assert!(near, "{a:?} {b:?}");
+        assert!(text.contains("left 0 files where 1 are due"), "{text}");
+        let (taken, given) = (values(folder.path()), values(before.path()));
+        assert_eq!((taken.len(), given.len()), (2 * POSES, 2 * POSES));
+        for (a, b) in taken.iter().flatten().zip(given.iter().flatten()) {
+            // Frames in files are half floats.
+            let near = match (a, b) {
+                (Some(a), Some(b)) => (0..3).all(|c| (a[c] / b[c] - 1.0).abs() < 1e-3),
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            assert!(near, "{a:?} {b:?}");
+        }
     }
 }

@@ -53,6 +53,10 @@ impl Case {
 
 /// Holds the page's table of this name against the cases, or writes it.
 pub fn document(name: &str, cases: &[Case]) {
+    // The system's own messages stand in the tables: Linux's.
+    if cfg!(not(target_os = "linux")) {
+        return;
+    }
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/reference/odd-input.md");
     let mut rows = String::from("| what came in | what gonia says | exit code |\n|---|---|---|\n");
     for case in cases {
