@@ -120,8 +120,14 @@ fn a_cosine_in_the_values_is_seen_in_reciprocal_pairs_and_a_symmetric_one_is_not
             let good = samples(material.brdf.as_ref(), layout, 0.02);
             for (view, light, word) in [(1, 0, "f cos(theta_v)"), (0, 1, "f cos(theta_i)")] {
                 let said = said(&times_cosines(&good, view, light));
-                if !(said.len() == 1 && said[0].contains(word)) {
-                    missed.push(format!("{name}, {layout:?}, {word}: {said:?}"));
+                if said.is_empty() {
+                    missed.push(format!("{name}, {layout:?}, {word}"));
+                } else {
+                    // Never the other one.
+                    assert!(
+                        said.len() == 1 && said[0].contains(word),
+                        "{name}: {said:?}"
+                    );
                 }
             }
             assert!(said(&times_cosines(&good, 1, 1)).is_empty(), "{name}");
@@ -130,7 +136,7 @@ fn a_cosine_in_the_values_is_seen_in_reciprocal_pairs_and_a_symmetric_one_is_not
     // Few samples of narrow highlights, and anisotropic materials in one azimuth of light, have too few reciprocal
     // pairs.
     println!("{missed:#?}");
-    assert!(missed.len() <= 12, "{missed:#?}");
+    assert!(missed.len() <= 6, "{missed:#?}");
 }
 
 fn times_cosines(samples: &[Sample], view: i32, light: i32) -> Vec<Sample> {
