@@ -102,8 +102,8 @@ fn errors(scene: &Scene, rig: &Rig, truth: Pose, shot: u64) -> Vec<SampleError> 
     );
     let found = Registrar::new(rig).register(&frame, reading);
     let grid = SamplingGrid::new(rig);
-    let light = IdealLight::new(truth.light, rig.light.distance_m);
-    let back = CameraModel::new(&rig.camera)
+    let light = IdealLight::new(rig, truth.light);
+    let back = CameraModel::new(rig)
         .predict(truth.view, CameraShift::default())
         .inverse()
         .expect("a camera above the target");

@@ -218,7 +218,7 @@ impl Cells {
             first..(high as usize / side + 1).clamp(first, whole)
         };
         let (columns, rows) = (range(0, frame.width), range(1, frame.height));
-        let ideal_light = IdealLight::new(light, rig.light.distance_m);
+        let ideal_light = IdealLight::new(rig, light);
         let mut values = Vec::with_capacity(columns.len() * rows.len());
         for y in rows.clone() {
             for x in columns.clone() {

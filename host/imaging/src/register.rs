@@ -165,7 +165,7 @@ impl Registrar {
     /// For the frames of a rig.
     pub fn new(rig: &Rig) -> Self {
         Self {
-            camera: CameraModel::new(&rig.camera),
+            camera: CameraModel::new(rig),
             target: rig.target.clone(),
             hough_resolution: HOUGH_RESOLUTION,
         }
@@ -184,10 +184,10 @@ impl Registrar {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
         match self.locate(frame, reading.view, &predicted) {
             Ok(solution) => Registration {
-                view: Direction::from_deg(
-                    (reading.view.theta + solution.shift.theta).to_degrees(),
-                    (reading.view.phi + solution.shift.phi).to_degrees(),
-                ),
+                view: self
+                    .camera
+                    .placement(reading.view, solution.shift)
+                    .direction(),
                 pose_offset: PoseOffset {
                     theta_deg: solution.shift.theta.to_degrees(),
                     phi_deg: solution.shift.phi.to_degrees(),
@@ -205,7 +205,10 @@ impl Registrar {
                     pixel_from_target: predicted,
                     residual_px: failure.scatter_px,
                     pose_offset: PoseOffset::default(),
-                    view: reading.view,
+                    view: self
+                        .camera
+                        .placement(reading.view, CameraShift::default())
+                        .direction(),
                     blur_px: failure.blur_px,
                     lines_found: failure.lines_found,
                     state: RegistrationState::FellBack(reason),

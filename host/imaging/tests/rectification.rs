@@ -18,7 +18,7 @@ fn a_rectified_frame_shows_each_point_of_the_target_at_its_place() {
     let view = View::of_target(&rig, 0.5);
     assert_eq!(view.side_px, 350);
     let seen = rectify(&frame, &registration, &view);
-    let light = IdealLight::new(truth.light, 1.1);
+    let light = IdealLight::new(&rig, truth.light);
     for (row, column) in [(60, 60), (175, 175), (60, 290), (250, 130)] {
         let at = view.point_mm(column, row);
         let f = true_brdf(scene.material.as_ref(), &scene.geometry, truth, at);

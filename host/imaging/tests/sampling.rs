@@ -25,7 +25,7 @@ fn directions_of_samples_are_true_to_two_hundredths_of_a_degree() {
             reading.view.theta += 0.01f64.to_radians();
             let frame = scene.frame(Role::Material, truth, 5);
             let found = Registrar::new(&rig).register(&frame, reading);
-            let true_map = CameraModel::new(&rig.camera)
+            let true_map = CameraModel::new(&rig)
                 .predict(truth.view, CameraShift::default())
                 .inverse()
                 .unwrap();
@@ -62,7 +62,7 @@ fn values_belong_to_the_place_they_name_even_where_patches_hold_few_pixels() {
             let truth = Pose::from_deg(angles);
             let frame = scene.frame(Role::Material, truth, 0);
             let found = Registrar::new(&rig).register(&frame, truth);
-            let light = IdealLight::new(truth.light, 1.1);
+            let light = IdealLight::new(&rig, truth.light);
             for (at, value) in grid
                 .points_mm()
                 .iter()
@@ -212,7 +212,7 @@ fn values_are_unbiased_and_scatter_as_little_as_a_median_can() {
         reading.view.theta += 0.01f64.to_radians();
         let frame = scene.frame(Role::Reference, truth, 5);
         let found = Registrar::new(&rig).register(&frame, reading);
-        let light = IdealLight::new(truth.light, 1.1);
+        let light = IdealLight::new(&rig, truth.light);
         let at_centre = true_brdf(scene.reference.as_ref(), &scene.geometry, truth, [0.0; 2]);
         let mean = at_centre.iter().sum::<f64>() / 3.0;
         let typical = mean.min(std::f64::consts::FRAC_1_PI) * truth.light.theta.cosine();

@@ -1,11 +1,10 @@
 //! Which bins a session has filled.
 
 use crate::slice::Slice;
-use gonia_brdf::direction::local_direction;
 use gonia_brdf::{Direction, Grid, Pose};
 use gonia_imaging::{IdealLight, SamplingGrid};
 use gonia_pipeline::process::SampledFrame;
-use gonia_rig::Rig;
+use gonia_rig::{CameraModel, Rig};
 
 /// The bins of the paper's grid with a sample in them, and one slice of their values. The values are
 /// those under an ideal point light, relative: enough to see that something is wrong, and known
@@ -13,8 +12,8 @@ use gonia_rig::Rig;
 pub struct SeenBins {
     grid: Grid,
     points_mm: Vec<[f64; 2]>,
-    light_m: f64,
-    camera_m: f64,
+    rig: Rig,
+    camera: CameraModel,
     /// A bit a cell.
     seen: Vec<u64>,
     bins: usize,
@@ -29,8 +28,8 @@ impl SeenBins {
         Self {
             grid,
             points_mm: SamplingGrid::new(rig).points_mm().to_vec(),
-            light_m: rig.light.distance_m,
-            camera_m: rig.camera.distance_m,
+            rig: rig.clone(),
+            camera: CameraModel::new(rig),
             seen: vec![0; grid.n_cells().div_ceil(64)],
             bins: 0,
             samples: 0,
@@ -40,7 +39,8 @@ impl SeenBins {
 
     /// Takes in a frame of the material. Whether the slice has changed.
     pub fn add(&mut self, frame: &SampledFrame) -> bool {
-        let ideal = IdealLight::new(frame.reading.light, self.light_m);
+        let ideal = IdealLight::new(&self.rig, frame.reading.light);
+        let camera = frame.camera_at(&self.camera);
         let mut changed = false;
         for (point_mm, value) in self.points_mm.iter().zip(&frame.points) {
             let Ok(value) = value else { continue };
@@ -49,14 +49,13 @@ impl SeenBins {
             if irradiance <= 0.0 {
                 continue;
             }
-            let at_m = at_mm.map(|c| c * 1e-3);
-            let node = |arm, distance_m| {
-                let local = Direction::from_vec3(local_direction(arm, distance_m, at_m));
+            let node = |to| {
+                let local = Direction::from_vec3(to);
                 self.grid.nearest(local.theta_deg(), local.phi_deg())
             };
             let (Some(light), Some(view)) = (
-                node(frame.reading.light, self.light_m),
-                node(frame.view, self.camera_m),
+                node(ideal.direction_from(at_mm)),
+                node(camera.direction_from(at_mm)),
             ) else {
                 continue;
             };
@@ -95,6 +94,7 @@ impl SeenBins {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::direction::local_direction;
     use gonia_brdf::{Bins, Sample};
     use gonia_imaging::LeftOut;
     use gonia_pipeline::process::{FrameSampler, Hidden};

@@ -316,8 +316,7 @@ fn run(case: &Case) -> Row {
             light: Direction::from_deg(LIGHT[0], LIGHT[1]),
             view: Direction::from_deg(view[0] + READING_OFF_DEG, view[1] - READING_OFF_DEG),
         };
-        let true_map =
-            CameraModel::new(&rig.camera).predict(true_pose.view, CameraShift::default());
+        let true_map = CameraModel::new(&rig).predict(true_pose.view, CameraShift::default());
         let seen = frame_of(case, &scene, true_pose, &true_map);
         look(case, &rig, &seen, true_pose, told, &true_map, &mut row);
     }

@@ -1,9 +1,10 @@
 //! The rig's camera: what a pose lets one expect in the image.
 
-use crate::{CameraGeometry, Homography};
+use crate::{ArmGeometry, CameraMount, Homography, Placement, Rig, TargetPlace};
 use gonia_brdf::Direction;
 use gonia_brdf::Elementary;
-use nalgebra::{Matrix3, Rotation2};
+use gonia_brdf::direction::dot;
+use nalgebra::Matrix3;
 
 /// Rounds in which the inverse of a lens is sought, and the step (in focal lengths) at which it is found.
 const LEAST_ROUNDS: usize = 8;
@@ -17,6 +18,9 @@ const SETTLED: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraModel {
     distance_mm: f64,
+    arm: ArmGeometry,
+    mount: CameraMount,
+    target: TargetPlace,
     /// Along rows and columns.
     focal_px: [f64; 2],
     centre_px: [f64; 2],
@@ -45,9 +49,13 @@ pub struct CameraShift {
 
 impl CameraModel {
     /// The camera of a rig.
-    pub fn new(camera: &CameraGeometry) -> Self {
+    pub fn new(rig: &Rig) -> Self {
+        let camera = &rig.camera;
         Self {
             distance_mm: camera.distance_m * 1000.0,
+            arm: camera.arm,
+            mount: camera.mount,
+            target: rig.target.place,
             focal_px: [
                 camera.focal_px,
                 camera.focal_y_px.unwrap_or(camera.focal_px),
@@ -64,41 +72,47 @@ impl CameraModel {
         self.radial != [0.0; 3] || self.tangential != [0.0; 2]
     }
 
-    /// The map from millimetres on the target to ideal pixels, for a camera that looks at the
-    /// centre from `view`: image up is −∂d/∂θ, image right (−sin φ, cos φ, 0).
-    pub fn predict(&self, view: Direction, by: CameraShift) -> Homography {
-        let (st, ct) = (view.theta + by.theta).sine_cosine();
-        let (sp, cp) = (view.phi + by.phi).sine_cosine();
-        let turn = Rotation2::new(by.roll);
-        let focal = self.focal_px.map(|f| f * by.log_scale.exponential());
-        let image = |right: f64, down: f64| {
-            let turned = turn * nalgebra::Vector2::new(right, down);
-            [turned[0] * focal[0], turned[1] * focal[1]]
+    /// Where the camera stands and how its image lies, when its arm reads `reading` and is off by `by`.
+    pub fn placement(&self, reading: Direction, by: CameraShift) -> Placement {
+        let shaft = Direction {
+            theta: reading.theta + by.theta,
+            phi: reading.phi + by.phi,
         };
-        // Columns: where a step along x, a step along y and the centre go; the last row is depth.
-        let (x, y) = (image(-sp, ct * cp), image(cp, ct * sp));
+        let held = self.arm.placement(shaft, self.distance_mm, &self.target);
+        let roll = self.mount.roll_deg.to_radians() + by.roll;
+        held.aimed(self.mount.aim_mm, self.distance_mm, roll)
+    }
+
+    /// The map from millimetres on the target to ideal pixels, when the camera's arm reads `reading` and
+    /// is off by `by`. For an ideal rig: image up is −∂d/∂θ, image right (−sin φ, cos φ, 0).
+    pub fn predict(&self, reading: Direction, by: CameraShift) -> Homography {
+        let camera = self.placement(reading, by);
+        let focal = self.focal_px.map(|f| f * by.log_scale.exponential());
+        let down = camera.up.map(|c| -c);
         let k = Matrix3::new(
-            1.0,
+            focal[0],
             0.0,
             self.centre_px[0] + by.shift_px[0],
             0.0,
-            1.0,
+            focal[1],
             self.centre_px[1] + by.shift_px[1],
             0.0,
             0.0,
             1.0,
         );
+        // Columns: where a step along x, a step along y and the centre go; the last row is depth.
+        let (right, back, at) = (camera.right, camera.back, camera.at_mm);
         Homography::from_matrix(
             k * Matrix3::new(
-                x[0],
-                y[0],
-                0.0,
-                x[1],
-                y[1],
-                0.0,
-                -st * cp,
-                -st * sp,
-                self.distance_mm,
+                right[0],
+                right[1],
+                -dot(at, right),
+                down[0],
+                down[1],
+                -dot(at, down),
+                -back[0],
+                -back[1],
+                dot(at, back),
             ),
         )
     }
@@ -163,17 +177,18 @@ mod tests {
 
     #[test]
     fn the_prediction_follows_the_conventions() {
-        let camera = CameraModel::new(&Rig::paper(400).camera);
+        let camera = CameraModel::new(&Rig::paper(400));
         let at = |t: f64, p: f64, mm| {
             camera
                 .predict(Direction::from_deg(t, p), CameraShift::default())
                 .apply(mm)
         };
-        assert_eq!(at(0.0, 0.0, [0.0, 0.0]), [200.0, 200.0]);
+        let centre = at(0.0, 0.0, [0.0, 0.0]);
+        assert!(centre.iter().all(|c| (c - 200.0).abs() < 1e-9));
         // At the pole with φ = 0, right is +y and up is −x.
         let scale = 625.0 / 1800.0;
         let right = at(0.0, 0.0, [0.0, 100.0]);
-        assert!((right[0] - 200.0 - 100.0 * scale).abs() < 1e-9 && right[1] == 200.0);
+        assert!((right[0] - 200.0 - 100.0 * scale).abs() < 1e-9 && (right[1] - 200.0).abs() < 1e-9);
         assert!(at(0.0, 0.0, [-100.0, 0.0])[1] < 200.0);
         // Obliquely, what lies towards the camera is low in the image and larger.
         let (near, far) = (at(60.0, 90.0, [0.0, 100.0]), at(60.0, 90.0, [0.0, -100.0]));
@@ -191,7 +206,7 @@ mod tests {
         camera.centre_px = [500.0, 510.0];
         (camera.k1, camera.k2, camera.k3) = (-0.25, 0.11, -0.03);
         (camera.p1, camera.p2) = (0.002, -0.003);
-        let model = CameraModel::new(camera);
+        let model = CameraModel::new(&rig);
         let ideal = [500.0 + 900.0 * 0.21, 510.0 - 880.0 * 0.34];
         // r² = 0.1597; d = 1 − 0.039925 + 0.00280545… − 0.000122189… = 0.96275826…
         let d = 1.0 - 0.25 * 0.1597 + 0.11 * 0.1597f64.powi(2) - 0.03 * 0.1597f64.powi(3);
@@ -216,7 +231,7 @@ mod tests {
     fn undistortion_undoes_distortion() {
         let mut rig = Rig::paper(1024);
         (rig.camera.k1, rig.camera.k2) = (-0.12, 0.05);
-        let camera = CameraModel::new(&rig.camera);
+        let camera = CameraModel::new(&rig);
         for ideal in [[512.0, 512.0], [30.0, 900.0], [1000.0, 10.0]] {
             let back = camera.undistort(camera.distort(ideal));
             assert!((back[0] - ideal[0]).hypotenuse(back[1] - ideal[1]) < 1e-4);

@@ -3,8 +3,8 @@
 use crate::bench_setup::{Source, check_bench};
 use crate::rig_error::within;
 use crate::{
-    CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig, RigError, Sampling, Sensor,
-    Target,
+    ArmGeometry, CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig, RigError,
+    Sampling, Sensor, Target,
 };
 use gonia_brdf::Elementary;
 
@@ -17,7 +17,13 @@ const MAX_FOLD_PX: f64 = 0.5;
 /// The first value that is not possible, in the order of the file.
 pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     within("light.distance_m", rig.light.distance_m, 0.01..=1000.0, "m")?;
+    check_arm("light.arm", &rig.light.arm)?;
+    for beam in rig.light.beam {
+        within("light.beam", beam, -100.0..=100.0, "")?;
+    }
     check_camera(&rig.camera)?;
+    check_arm("camera.arm", &rig.camera.arm)?;
+    check_lens(rig)?;
     check_simulated(&rig.camera, rig.source.as_ref())?;
     check_target(&rig.target)?;
     if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
@@ -107,7 +113,26 @@ fn check_camera(camera: &CameraGeometry) -> Result<(), RigError> {
     for (key, value) in [("camera.p1", camera.p1), ("camera.p2", camera.p2)] {
         within(key, value, -1.0..=1.0, "")?;
     }
-    check_lens(camera)
+    let aim_mm = 500.0 * camera.distance_m;
+    within(
+        "camera.mount.roll_deg",
+        camera.mount.roll_deg,
+        -360.0..=360.0,
+        "degrees",
+    )?;
+    for aim in camera.mount.aim_mm {
+        within("camera.mount.aim_mm", aim, -aim_mm..=aim_mm, "mm")?;
+    }
+    Ok(())
+}
+
+/// An arm that is further from an ideal one than this is another machine, or a slip of the pen.
+fn check_arm(key: &'static str, arm: &ArmGeometry) -> Result<(), RigError> {
+    within(key, arm.theta_zero_deg, -90.0..=90.0, "degrees")?;
+    within(key, arm.phi_zero_deg, -360.0..=360.0, "degrees")?;
+    within(key, arm.axis_square_deg, -20.0..=20.0, "degrees")?;
+    within(key, arm.axis_miss_mm, -1e3..=1e3, "mm")?;
+    within(key, arm.right_mm, -1e3..=1e3, "mm")
 }
 
 /// The simulated camera draws two radial terms and square pixels: with others its frames would be of
@@ -127,8 +152,8 @@ fn check_simulated(camera: &CameraGeometry, source: Option<&Source>) -> Result<(
 
 /// Checks that the lens has an inverse over the frame: terms of another order, or of another program's
 /// model, fold its corners inwards.
-fn check_lens(camera: &CameraGeometry) -> Result<(), RigError> {
-    let model = CameraModel::new(camera);
+fn check_lens(rig: &Rig) -> Result<(), RigError> {
+    let (camera, model) = (&rig.camera, CameraModel::new(rig));
     let (width, height) = (camera.width_px as f64, camera.height_px as f64);
     for corner in [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]] {
         let back = model.distort(model.undistort(corner));
@@ -167,6 +192,14 @@ fn check_target(target: &Target) -> Result<(), RigError> {
         0.1..=1e5,
         "mm",
     )?;
+    let place = &target.place;
+    within("target.place.height_mm", place.height_mm, -1e3..=1e3, "mm")?;
+    for tilt in place.tilt_deg {
+        within("target.place.tilt_deg", tilt, -45.0..=45.0, "degrees")?;
+    }
+    for by in place.offset_mm {
+        within("target.place.offset_mm", by, -1e3..=1e3, "mm")?;
+    }
     let inner_edge = offset - 0.5 * target.line_width_mm;
     if target.material_half_mm > inner_edge {
         return Err(RigError {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`Rig`] and its parts | geometry, sensor, reference, sampling, as `rig.toml` has them |
 //! | [`ArmPorts`], [`Source`], [`SessionSettings`], [`Genicam`] | the bench setup of a session |
+//! | [`ArmGeometry`], [`TargetPlace`], [`Placement`] | arms and target as they were built, and where light and camera stand |
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
@@ -12,6 +13,7 @@
 //! | [`Remark`] | what is said of data that were used all the same |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
 
+mod arm_geometry;
 mod bench_setup;
 mod camera_model;
 mod cell_mask;
@@ -32,6 +34,7 @@ mod sensor;
 mod sound_samples;
 pub mod stratum;
 
+pub use arm_geometry::{ArmGeometry, Placement, TargetPlace};
 pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
@@ -44,7 +47,9 @@ pub use genicam::{ExposureTiming, Genicam, PixelFormat};
 pub use homography::Homography;
 pub use raw_frame::RawFrame;
 pub use remark::Remark;
-pub use rig::{CameraGeometry, LightGeometry, Reference, ReflectanceTable, Rig, Sampling, Target};
+pub use rig::{
+    CameraGeometry, CameraMount, LightGeometry, Reference, ReflectanceTable, Rig, Sampling, Target,
+};
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;
 pub use scale::Scale;

@@ -1,8 +1,10 @@
 //! `rig.toml`: where light, camera and target are.
 
+use crate::arm_geometry::Placement;
+use crate::arm_geometry::{ArmGeometry, TargetPlace};
 use crate::bench_setup::{ArmPorts, SessionSettings, Source};
 use crate::sensor::Sensor;
-use gonia_brdf::Pose;
+use gonia_brdf::{Direction, Pose};
 use serde::{Deserialize, Serialize};
 
 /// The geometry of a rig and how its frames are sampled.
@@ -40,6 +42,25 @@ pub struct Rig {
 pub struct LightGeometry {
     /// Distance from the sample's centre, metres.
     pub distance_m: f64,
+    /// The arm that holds it, as it was built.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub arm: ArmGeometry,
+    /// The beam: logarithm of its intensity relative to that towards the target's centre, by the tangents
+    /// u (right) and v (up) of the angle off that line as the light sees it: coefficients of u, v, u², u·v
+    /// and v². All zero: the same in all directions.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub beam: [f64; 5],
+}
+
+/// How the camera sits on its arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraMount {
+    /// Turn of the image about the line of sight, clockwise as the frame shows it, degrees.
+    pub roll_deg: f64,
+    /// The point of the target that it looks at from straight above, right and down of the centre as the
+    /// frame shows it, mm.
+    pub aim_mm: [f64; 2],
 }
 
 /// A pinhole camera with optional distortion, in OpenCV's terms.
@@ -48,6 +69,12 @@ pub struct LightGeometry {
 pub struct CameraGeometry {
     /// Distance from the sample's centre, metres.
     pub distance_m: f64,
+    /// The arm that holds it, as it was built.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub arm: ArmGeometry,
+    /// How it sits on the arm.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub mount: CameraMount,
     /// Width of a frame, pixels.
     pub width_px: usize,
     /// Height of a frame, pixels.
@@ -86,6 +113,9 @@ pub struct Target {
     pub line_width_mm: f64,
     /// Half the side of the sample, mm.
     pub material_half_mm: f64,
+    /// Where it lies between the arms.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub place: TargetPlace,
 }
 
 /// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
@@ -163,14 +193,24 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 impl Rig {
     /// The paper's rig with a camera of `px` × `px` pixels that sees the whole target at any
     /// polar angle up to 75°.
     pub fn paper(px: usize) -> Self {
         Self {
-            light: LightGeometry { distance_m: 1.1 },
+            light: LightGeometry {
+                distance_m: 1.1,
+                arm: ArmGeometry::default(),
+                beam: [0.0; 5],
+            },
             camera: CameraGeometry {
                 distance_m: 1.8,
+                arm: ArmGeometry::default(),
+                mount: CameraMount::default(),
                 width_px: px,
                 height_px: px,
                 focal_px: 1600.0 / 1024.0 * px as f64,
@@ -186,6 +226,7 @@ impl Rig {
                 line_offset_mm: 335.0,
                 line_width_mm: 4.0,
                 material_half_mm: 320.0,
+                place: TargetPlace::default(),
             },
             reference: None,
             sensor: None,
@@ -198,5 +239,14 @@ impl Rig {
             source: None,
             session: None,
         }
+    }
+
+    /// Where the light stands when its arm reads `reading`.
+    pub fn light_at(&self, reading: Direction) -> Placement {
+        let light = &self.light;
+        let distance_mm = 1000.0 * light.distance_m;
+        light
+            .arm
+            .placement(reading, distance_mm, &self.target.place)
     }
 }

@@ -1,8 +1,8 @@
 //! The light: a point source with a beam that is neither uniform nor centred.
 
-use super::optics::axes;
 use gonia_brdf::Elementary;
-use gonia_brdf::direction::{Direction, Vec3, dot};
+use gonia_brdf::direction::{Vec3, dot};
+use gonia_rig::Placement;
 
 /// A smooth beam, Gaussian in the tangent of the angle off its own axis, which does not quite point
 /// at the target's centre. Relative to its value at the centre.
@@ -27,9 +27,7 @@ impl Default for Beam {
 /// The irradiance over the target.
 pub struct LightField {
     at_m: Vec3,
-    direction: Vec3,
-    right: Vec3,
-    up: Vec3,
+    placement: Placement,
     distance_m: f64,
     beam: Option<PreparedBeam>,
 }
@@ -41,14 +39,10 @@ struct PreparedBeam {
 }
 
 impl LightField {
-    pub fn new(distance_m: f64, light: Direction, beam: Option<Beam>) -> Self {
-        let (right, up) = axes(light);
-        let direction = light.to_vec3();
+    pub fn new(distance_m: f64, light: &Placement, beam: Option<Beam>) -> Self {
         Self {
-            at_m: direction.map(|c| c * distance_m),
-            direction,
-            right,
-            up,
+            at_m: light.at_mm.map(|c| c * 1e-3),
+            placement: *light,
             distance_m,
             beam: beam.map(|b| {
                 let axis = b.axis_deg.map(|a| a.to_radians().tangent());
@@ -74,16 +68,16 @@ impl LightField {
         let unit = to.map(|c| c * inverse);
         let fall_off = self.distance_m * self.distance_m * inverse2;
         let beam = match &self.beam {
-            Some(beam) => self.beam_at(beam, point_m),
+            Some(beam) => self.beam_at(beam, to),
             None => 1.0,
         };
         (unit, beam * unit[2].max(0.0) * fall_off)
     }
 
-    fn beam_at(&self, beam: &PreparedBeam, p: [f64; 2]) -> f64 {
-        let depth = self.distance_m - self.direction[0] * p[0] - self.direction[1] * p[1];
-        let u = (self.right[0] * p[0] + self.right[1] * p[1]) / depth - beam.axis[0];
-        let v = (self.up[0] * p[0] + self.up[1] * p[1]) / depth - beam.axis[1];
+    fn beam_at(&self, beam: &PreparedBeam, to_light: Vec3) -> f64 {
+        let depth = dot(to_light, self.placement.back);
+        let u = -dot(to_light, self.placement.right) / depth - beam.axis[0];
+        let v = -dot(to_light, self.placement.up) / depth - beam.axis[1];
         (beam.scale * (u * u + v * v) - beam.at_centre).exponential()
     }
 }
@@ -91,12 +85,18 @@ impl LightField {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::Direction;
+    use gonia_rig::{ArmGeometry, TargetPlace};
 
     #[test]
     fn irradiance_is_one_at_the_centre_and_falls_with_distance_and_cosine() {
-        let normal = LightField::new(1.1, Direction::from_deg(0.0, 0.0), Some(Beam::default()));
+        let at = |theta| {
+            let (arm, target) = (ArmGeometry::default(), TargetPlace::default());
+            arm.placement(Direction::from_deg(theta, 0.0), 1100.0, &target)
+        };
+        let normal = LightField::new(1.1, &at(0.0), Some(Beam::default()));
         assert!((normal.at([0.0; 2]).1 - 1.0).abs() < 1e-12);
-        let point = LightField::new(1.1, Direction::from_deg(60.0, 0.0), None);
+        let point = LightField::new(1.1, &at(60.0), None);
         assert!((point.at([0.0; 2]).1 - 0.5).abs() < 1e-12);
         // Straight below the light: closer and at normal incidence.
         let below = 1.1 * 60f64.to_radians().sine();

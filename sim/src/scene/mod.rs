@@ -20,8 +20,9 @@ pub use occluder::Occluder;
 pub use sensor::RawSensor;
 pub use target::Texture;
 
-use gonia_brdf::direction::{Vec3, local_direction, normalize};
-use gonia_brdf::{Brdf, Pose};
+use gonia_brdf::direction::{Vec3, normalize};
+use gonia_brdf::{Brdf, Direction, Pose};
+use gonia_rig::{ArmGeometry, CameraMount, Placement, TargetPlace};
 use light::LightField;
 use noise::NoiseField;
 use occluder::Silhouette;
@@ -56,6 +57,14 @@ pub struct SceneGeometry {
     pub material_half_mm: f64,
     /// Half the side of the desk, to whose edge the lines go, mm.
     pub desk_half_mm: f64,
+    /// The arm that holds the light, as it was built.
+    pub light_arm: ArmGeometry,
+    /// The arm that holds the camera, as it was built.
+    pub camera_arm: ArmGeometry,
+    /// How the camera sits on its arm.
+    pub camera_mount: CameraMount,
+    /// Where the target lies between the arms.
+    pub target_place: TargetPlace,
 }
 
 impl SceneGeometry {
@@ -75,7 +84,28 @@ impl SceneGeometry {
             line_width_mm: 4.0,
             material_half_mm: 320.0,
             desk_half_mm: 400.0,
+            light_arm: ArmGeometry::default(),
+            camera_arm: ArmGeometry::default(),
+            camera_mount: CameraMount::default(),
+            target_place: TargetPlace::default(),
         }
+    }
+
+    /// Where the light stands at true shaft angles.
+    fn light_at(&self, shaft: Direction) -> Placement {
+        let distance_mm = 1000.0 * self.light_distance_m;
+        self.light_arm
+            .placement(shaft, distance_mm, &self.target_place)
+    }
+
+    /// Where the camera stands and how its image lies at true shaft angles.
+    fn camera_at(&self, shaft: Direction) -> Placement {
+        let distance_mm = 1000.0 * self.camera_distance_m;
+        let held = self
+            .camera_arm
+            .placement(shaft, distance_mm, &self.target_place);
+        let mount = &self.camera_mount;
+        held.aimed(mount.aim_mm, distance_mm, mount.roll_deg.to_radians())
     }
 }
 
@@ -177,7 +207,9 @@ struct Painter<'a> {
 impl<'a> Painter<'a> {
     fn new(scene: &'a Scene, which: Surface, pose: Pose) -> Self {
         let geometry = &scene.geometry;
-        let optics = Optics::new(geometry, pose.view);
+        let camera = geometry.camera_at(pose.view);
+        let light = geometry.light_at(pose.light);
+        let optics = Optics::new(geometry, &camera);
         let brdf = match which {
             Surface::Material => scene.material.as_ref(),
             Surface::Reference => scene.reference.as_ref(),
@@ -191,11 +223,11 @@ impl<'a> Painter<'a> {
             brdf,
             texture,
             target: TargetMap::new(geometry, optics.largest_blur_mm(geometry.desk_half_mm)),
-            light: LightField::new(geometry.light_distance_m, pose.light, scene.beam),
-            camera_at_m: pose.view.to_vec3().map(|c| c * geometry.camera_distance_m),
-            silhouette: scene
-                .occluder
-                .and_then(|o| Silhouette::new(o, geometry.light_distance_m, pose.light, &optics)),
+            light: LightField::new(geometry.light_distance_m, &light, scene.beam),
+            camera_at_m: camera.at_mm.map(|c| c * 1e-3),
+            silhouette: scene.occluder.and_then(|o| {
+                Silhouette::new(o, geometry.light_distance_m, light.direction(), &optics)
+            }),
             optics,
         }
     }
@@ -259,10 +291,9 @@ pub fn true_brdf(
     pose: Pose,
     point_mm: [f64; 2],
 ) -> [f64; 3] {
-    let point_m = point_mm.map(|c| c * 1e-3);
     brdf.eval(
-        local_direction(pose.light, geometry.light_distance_m, point_m),
-        local_direction(pose.view, geometry.camera_distance_m, point_m),
+        geometry.light_at(pose.light).direction_from(point_mm),
+        geometry.camera_at(pose.view).direction_from(point_mm),
     )
 }
 

@@ -20,6 +20,10 @@ impl SceneGeometry {
             line_offset_mm: rig.target.line_offset_mm,
             line_width_mm: rig.target.line_width_mm,
             material_half_mm: rig.target.material_half_mm,
+            light_arm: rig.light.arm,
+            camera_arm: rig.camera.arm,
+            camera_mount: rig.camera.mount,
+            target_place: rig.target.place,
             ..Self::paper(rig.camera.width_px)
         }
     }
@@ -36,6 +40,9 @@ impl SceneGeometry {
         rig.target.line_offset_mm = self.line_offset_mm;
         rig.target.line_width_mm = self.line_width_mm;
         rig.target.material_half_mm = self.material_half_mm;
+        (rig.light.arm, rig.camera.arm) = (self.light_arm, self.camera_arm);
+        rig.camera.mount = self.camera_mount;
+        rig.target.place = self.target_place;
         rig
     }
 }

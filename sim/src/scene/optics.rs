@@ -1,15 +1,15 @@
 //! The pinhole camera on its arm.
 
 use super::SceneGeometry;
-use gonia_brdf::Elementary;
-use gonia_brdf::direction::{Direction, Vec3, dot};
+use gonia_brdf::direction::{Vec3, dot};
+use gonia_rig::Placement;
 
 /// A camera at a pose: maps between pixels and the target's plane.
 pub struct Optics {
     right: Vec3,
     up: Vec3,
     back: Vec3,
-    distance_m: f64,
+    at_m: Vec3,
     focal_px: f64,
     centre_px: [f64; 2],
     distortion: [f64; 2],
@@ -19,22 +19,10 @@ pub struct Optics {
     target_from_pixel: [Vec3; 3],
 }
 
-/// Image axes of something at `d` that looks at the centre: right (−sin φ, cos φ, 0) and up −∂d/∂θ.
-pub fn axes(d: Direction) -> (Vec3, Vec3) {
-    let (st, ct) = d.theta.sine_cosine();
-    let (sp, cp) = d.phi.sine_cosine();
-    ([-sp, cp, 0.0], [-ct * cp, -ct * sp, st])
-}
-
 impl Optics {
-    pub fn new(geometry: &SceneGeometry, view: Direction) -> Self {
-        let (right, up) = axes(view);
-        let back = view.to_vec3();
-        let (f, c, distance) = (
-            geometry.focal_px,
-            geometry.centre_px,
-            geometry.camera_distance_m,
-        );
+    pub fn new(geometry: &SceneGeometry, camera: &Placement) -> Self {
+        let (right, up, back) = (camera.right, camera.up, camera.back);
+        let (f, c) = (geometry.focal_px, geometry.centre_px);
         // Ray of a pixel: −back + right·(px − cx)/f − up·(py − cy)/f; it meets z = 0 at
         // camera − ray·camera_z/ray_z. Each of the three numbers is linear in the pixel.
         let ray = |axis: usize| -> Vec3 {
@@ -45,14 +33,14 @@ impl Optics {
             ]
         };
         let (rx, ry, rz) = (ray(0), ray(1), ray(2));
-        let at = back.map(|b| b * distance * 1000.0);
+        let at = camera.at_mm;
         let row =
             |along: Vec3, from: f64| -> Vec3 { [0, 1, 2].map(|i| from * rz[i] - at[2] * along[i]) };
         Self {
             right,
             up,
             back,
-            distance_m: distance,
+            at_m: at.map(|c| c * 1e-3),
             focal_px: f,
             centre_px: c,
             distortion: geometry.distortion,
@@ -94,14 +82,12 @@ impl Optics {
 
     /// Pixel and pixels per metre at a point of space in front of the camera.
     pub fn project(&self, point_m: Vec3) -> Option<([f64; 2], f64)> {
-        let depth = self.distance_m - dot(point_m, self.back);
+        let from = [0, 1, 2].map(|i| point_m[i] - self.at_m[i]);
+        let depth = -dot(from, self.back);
         if depth <= 1e-3 {
             return None;
         }
-        let (x, y) = (
-            dot(point_m, self.right) / depth,
-            -dot(point_m, self.up) / depth,
-        );
+        let (x, y) = (dot(from, self.right) / depth, -dot(from, self.up) / depth);
         let r2 = x * x + y * y;
         let stretch = 1.0 + r2 * (self.distortion[0] + r2 * self.distortion[1]);
         let pixel = [
@@ -141,13 +127,15 @@ impl Optics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::{Direction, Elementary};
 
     #[test]
     fn pixels_and_points_of_the_target_agree() {
         let mut geometry = SceneGeometry::paper(400);
         geometry.distortion = [-0.08, 0.02];
         for view in [(0.0, 0.0), (30.0, 200.0), (75.0, 45.0)] {
-            let optics = Optics::new(&geometry, Direction::from_deg(view.0, view.1));
+            let camera = geometry.camera_at(Direction::from_deg(view.0, view.1));
+            let optics = Optics::new(&geometry, &camera);
             for point in [[0.0, 0.0], [300.0, -200.0], [-335.0, 335.0]] {
                 let (pixel, _) = optics
                     .project([point[0] * 1e-3, point[1] * 1e-3, 0.0])
@@ -160,7 +148,9 @@ mod tests {
 
     #[test]
     fn the_image_is_upright_and_not_mirrored() {
-        let optics = Optics::new(&SceneGeometry::paper(400), Direction::from_deg(30.0, 90.0));
+        let geometry = SceneGeometry::paper(400);
+        let camera = geometry.camera_at(Direction::from_deg(30.0, 90.0));
+        let optics = Optics::new(&geometry, &camera);
         // From +y the camera has −x at its right and the far side, −y, up.
         let at = |x, y| optics.project([x, y, 0.0]).unwrap().0;
         assert!(at(-0.1, 0.0)[0] > 200.0);

@@ -2,13 +2,18 @@
 
 use super::*;
 use gonia_brdf::Elementary;
-use gonia_rig::CameraGeometry;
+use gonia_rig::{CameraGeometry, TargetPlace};
 
 /// The edges of five squares by five, as if the target's lines ran along them.
 const TARGET: Target = Target {
     line_offset_mm: 335.0,
     line_width_mm: 7.0,
     material_half_mm: 280.0,
+    place: TargetPlace {
+        height_mm: 0.0,
+        tilt_deg: [0.0; 2],
+        offset_mm: [0.0; 2],
+    },
 };
 const SQUARE_MM: f64 = 2.0 * 335.0 / 5.0;
 

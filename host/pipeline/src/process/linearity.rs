@@ -28,7 +28,7 @@ pub fn doubt(
     let points: Vec<[f64; 2]> = frames
         .iter()
         .filter_map(|frame| {
-            let light = IdealLight::new(frame.pose.light, rig.light.distance_m);
+            let light = IdealLight::new(rig, frame.reading.light);
             let irradiance = light.irradiance([0.0; 2]);
             let known = reference.at(frame.pose.light.to_vec3(), frame.pose.view.to_vec3());
             let seen = frame.relative.get(centre)?;

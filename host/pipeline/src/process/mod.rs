@@ -23,11 +23,10 @@ pub use source::{FrameRow, FrameSource, Role};
 
 use crate::progress::Cancelled;
 use calibration::Calibrator;
-use gonia_brdf::direction::local_direction;
 use gonia_brdf::{Direction, Sample};
 use gonia_formats::FileError;
 use gonia_imaging::{IdealLight, SamplingGrid};
-use gonia_rig::{Frame, Remark, Rig};
+use gonia_rig::{CameraModel, Frame, Remark, Rig};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
 use remarks::HeardRemarks;
@@ -192,6 +191,7 @@ pub fn process_sampled(
     }
     let bench = Bench {
         rig,
+        camera: CameraModel::new(rig),
         sampled,
         masks,
         grid: SamplingGrid::new(rig),
@@ -280,6 +280,7 @@ fn load(
 /// What every frame needs.
 struct Bench<'a> {
     rig: &'a Rig,
+    camera: CameraModel,
     sampled: Sampled<'a>,
     masks: &'a Masks,
     grid: SamplingGrid,
@@ -325,9 +326,11 @@ impl Bench<'_> {
         if let Outcome::Refused(_) = report.outcome {
             return Ok((report, None));
         }
-        let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
+        let light = IdealLight::new(self.rig, row.pose.light);
         let irradiance = |i, value: &SampledPoint| light.irradiance(self.place(i, value));
-        Ok((report, Some(ReferenceFrame::new(frame, irradiance))))
+        let direction = Direction::from_vec3(light.direction_from([0.0; 2]));
+        let found = ReferenceFrame::new(frame, direction, irradiance);
+        Ok((report, Some(found)))
     }
 
     fn material(
@@ -344,7 +347,7 @@ impl Bench<'_> {
             (None, None) => Hidden::Find,
         };
         let frame = (self.sampled)(row, hidden)?;
-        let view = frame.view;
+        let camera = frame.camera_at(&self.camera);
         let mut report = frame.report;
         let mut counts = LeftOutCounts::default();
         if let Outcome::Refused(_) = report.outcome {
@@ -355,7 +358,7 @@ impl Bench<'_> {
             return Ok((report, Vec::new(), counts));
         }
         let points = frame.points;
-        let light = IdealLight::new(row.pose.light, self.rig.light.distance_m);
+        let light = IdealLight::new(self.rig, row.pose.light);
         let mut samples = Vec::with_capacity(points.len());
         for (i, point) in points.iter().enumerate() {
             let value = match point {
@@ -371,7 +374,7 @@ impl Bench<'_> {
                 counts.below_horizon += 1;
                 continue;
             }
-            let (to_light, to_camera) = self.directions(row.pose.light, view, at);
+            let (to_light, to_camera) = (light.direction_from(at), camera.direction_from(at));
             let relative = value.rgb.map(|v| v / irradiance as f32);
             let Some(rgb) =
                 calibrator.value(relative, reference, i, (to_light, to_camera), &mut counts)
@@ -391,19 +394,5 @@ impl Bench<'_> {
     fn place(&self, point: usize, value: &SampledPoint) -> [f64; 2] {
         let at = self.grid.points_mm()[point];
         [0, 1].map(|i| at[i] + f64::from(value.offset_mm[i]))
-    }
-
-    /// Unit vectors from a point of the target (mm) to light and camera: eqs. (1) and (2).
-    fn directions(
-        &self,
-        light: Direction,
-        view: Direction,
-        at_mm: [f64; 2],
-    ) -> (gonia_brdf::Vec3, gonia_brdf::Vec3) {
-        let at = at_mm.map(|c| c * 1e-3);
-        (
-            local_direction(light, self.rig.light.distance_m, at),
-            local_direction(view, self.rig.camera.distance_m, at),
-        )
     }
 }

@@ -18,7 +18,7 @@ const SAME_AZIMUTH_DEG: f64 = 1.0;
 pub struct ReferenceFrame {
     /// The arms' reading.
     pub reading: Pose,
-    /// The light as read and the camera as estimated.
+    /// Light and camera as they were, seen from the centre.
     pub pose: Pose,
     /// Radiance over ideal irradiance; NaN where there is none.
     pub relative: Box<[[f32; 3]]>,
@@ -29,8 +29,13 @@ pub struct ReferenceFrame {
 }
 
 impl ReferenceFrame {
-    /// From a frame and the ideal light's irradiance at each of its points.
-    pub fn new(frame: SampledFrame, irradiance: impl Fn(usize, &SampledPoint) -> f64) -> Self {
+    /// From a frame, where the light was as seen from the centre, and the ideal light's irradiance at each
+    /// of its points.
+    pub fn new(
+        frame: SampledFrame,
+        light: Direction,
+        irradiance: impl Fn(usize, &SampledPoint) -> f64,
+    ) -> Self {
         let relative = |(i, point): (usize, &Result<SampledPoint, LeftOut>)| match point {
             Ok(value) => {
                 let scale = 1.0 / irradiance(i, value) as f32;
@@ -41,7 +46,7 @@ impl ReferenceFrame {
         Self {
             reading: frame.reading,
             pose: Pose {
-                light: frame.reading.light,
+                light,
                 view: frame.view,
             },
             relative: frame.points.iter().enumerate().map(relative).collect(),

@@ -6,7 +6,7 @@ use gonia_brdf::{Direction, Pose};
 use gonia_imaging::{
     LeftOut, Mask, PoseOffset, Registrar, Registration, SamplingGrid, find_occlusion,
 };
-use gonia_rig::{Frame, FrameRow, Rig};
+use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Placement, Rig};
 
 /// What one grid point shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct SampledFrame {
     pub report: FrameReport,
     /// The arms' reading.
     pub reading: Pose,
-    /// The camera's direction as its fiducial lines show it.
+    /// The camera's direction from the target's centre as its fiducial lines show it.
     pub view: Direction,
     /// In the order of the rig's grid; none when the frame was refused.
     pub points: Vec<Result<SampledPoint, LeftOut>>,
@@ -48,6 +48,17 @@ impl SampledFrame {
             points: Vec::new(),
             mask: None,
         }
+    }
+
+    /// Where the camera was, as its fiducial lines show it.
+    pub fn camera_at(&self, camera: &CameraModel) -> Placement {
+        let offset = self.report.pose_offset;
+        let by = CameraShift {
+            theta: offset.theta_deg.to_radians(),
+            phi: offset.phi_deg.to_radians(),
+            ..CameraShift::default()
+        };
+        camera.placement(self.reading.view, by)
     }
 }
 
