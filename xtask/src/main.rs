@@ -24,6 +24,7 @@ cargo xtask doors    which crate may use which, which file imports which, how lo
 cargo xtask boards   build the firmware of every board
 cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/images
 cargo xtask size     flash and RAM of every board against its budget
+cargo xtask systems  lint everything for Windows and macOS (the tests do so for Windows)
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
 cargo xtask windows  run the demo under Wine: the same bytes as on Linux
 cargo xtask book     check the links of all pages and build the book in docs/book
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         "boards" => boards::build(),
         "images" => boards::images(),
         "size" => boards::size(),
+        "systems" => steps::systems(),
         "fuzz" => steps::fuzz(),
         "windows" => windows::compare_with_linux(),
         "book" => book::book(),

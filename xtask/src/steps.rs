@@ -5,6 +5,7 @@ use crate::tools::{cargo, install, install_library, root, run};
 use crate::{boards, book, doors, figures, fuzz, imports, length, links, systems};
 use anyhow::{Result, bail};
 use std::path::Path;
+use std::process::Command;
 
 /// What the feature `genicam` is built with.
 const ARAVIS: [&str; 3] = ["libaravis-dev", "libusb-1.0-0-dev", "pkg-config"];
@@ -21,9 +22,17 @@ pub fn test() -> Result<()> {
 fn all(table: &mut Table, root: &Path) -> Result<()> {
     read_sources(table, root)?;
     let features = genicam(table);
-    compile(table, root, features)?;
-    run_tests(table, root, features)?;
-    fuzz_all(table, root, FUZZ_BRIEFLY_S)
+    table.step("targets of the boards", || boards::add_boards_targets(root))?;
+    // Boards and fuzzers have target folders of their own: neither waits for the workspace's.
+    table.side_by_side(
+        |table| compile(table, root, features),
+        |table| compile_others(table, root),
+    )?;
+    // The second row waits more than it computes.
+    table.side_by_side(
+        |table| run_tests(table, root, features),
+        |table| run_others(table, root, features),
+    )
 }
 
 /// Which crate may use which, which file may import which, how long a function may be.
@@ -91,10 +100,28 @@ fn compile(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
             .args(features)
             .args(["--", "-D", "warnings"]))
     })?;
-    systems::check(table, root)?;
-    table.step("targets of the boards", || boards::add_boards_targets(root))?;
+    systems::check(table, root, &[systems::WINDOWS])?;
+    table.step("build of the tests", || {
+        run(tests(root, features).arg("--no-run"))
+    })
+}
+
+fn compile_others(table: &mut Table, root: &Path) -> Result<()> {
     table.step("boards", || boards::build_all(root))?;
-    table.step("size of the boards", || boards::check_sizes(root))
+    table.step("size of the boards", || boards::check_sizes(root))?;
+    match fuzz::missing() {
+        None => table.step("build of the fuzzers", || fuzz::build(root)),
+        Some(_) => Ok(()),
+    }
+}
+
+/// The tests of the whole workspace, and of no less: another choice of crates has other features of their
+/// dependencies, and builds them once more.
+fn tests(root: &Path, features: &[&str]) -> Command {
+    let mut command = cargo(root);
+    command.args(["test", "--workspace", "--exclude", "xtask"]);
+    command.args(features);
+    command
 }
 
 fn run_tests(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
@@ -102,14 +129,14 @@ fn run_tests(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
     table.step("tests of the chores", || {
         run(cargo(root).args(["test", "--profile", "xtask", "--package", "xtask"]))
     })?;
-    let all = ["test", "--workspace", "--exclude", "xtask"];
-    table.step("tests", || run(cargo(root).args(all).args(features)))?;
-    // Here and below with the whole workspace's features, as all has been built for the tests above.
-    let ignored = |tests: &[&str], flags: &[&str]| {
-        let mut command = cargo(root);
-        command.args(all).args(features);
-        for test in tests {
-            command.args(["--test", test]);
+    table.step("tests", || run(&mut tests(root, features)))
+}
+
+fn run_others(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
+    let ignored = |names: &[&str], flags: &[&str]| {
+        let mut command = tests(root, features);
+        for name in names {
+            command.args(["--test", name]);
         }
         command.args(["--", "--ignored"]).args(flags);
         command
@@ -137,7 +164,7 @@ fn run_tests(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
         let why = "chromium is missing: apt-get install chromium";
         table.not_run("report and live page in a browser", why);
     }
-    Ok(())
+    run_fuzzers(table, root, FUZZ_BRIEFLY_S)
 }
 
 /// Seconds that the fuzzer has for a target by itself, and among all tests.
@@ -146,23 +173,33 @@ const FUZZ_BRIEFLY_S: u32 = 5;
 
 /// Runs every fuzz target of the protocol for a while.
 pub fn fuzz() -> Result<()> {
-    let mut table = Table::default();
-    fuzz_all(&mut table, &root()?, FUZZ_S)?;
+    let (mut table, root) = (Table::default(), root()?);
+    if fuzz::missing().is_none() {
+        table.step("build of the fuzzers", || fuzz::build(&root))?;
+    }
+    run_fuzzers(&mut table, &root, FUZZ_S)?;
     table.print();
     Ok(())
 }
 
 /// Says so where the fuzzer cannot run.
-fn fuzz_all(table: &mut Table, root: &Path, seconds: u32) -> Result<()> {
+fn run_fuzzers(table: &mut Table, root: &Path, seconds: u32) -> Result<()> {
     if let Some(why) = fuzz::missing() {
         table.not_run("fuzzing", why);
         return Ok(());
     }
-    table.step("build the fuzzers", || fuzz::build(root))?;
     for target in fuzz::TARGETS {
         table.step(&format!("fuzz {target}"), || {
             fuzz::run_target(root, target, seconds)
         })?;
     }
+    Ok(())
+}
+
+/// Lints for both other systems.
+pub fn systems() -> Result<()> {
+    let mut table = Table::default();
+    systems::check(&mut table, &root()?, &[systems::WINDOWS, systems::MACOS])?;
+    table.print();
     Ok(())
 }

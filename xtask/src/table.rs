@@ -20,6 +20,28 @@ impl Table {
         Ok(())
     }
 
+    /// Does two rows of steps side by side, on two threads: what each leaves idle of the machine the other
+    /// can use. Both go to their end; a failure of the first is reported before one of the second.
+    pub fn side_by_side(
+        &mut self,
+        first: impl FnOnce(&mut Self) -> Result<()> + Send,
+        second: impl FnOnce(&mut Self) -> Result<()> + Send,
+    ) -> Result<()> {
+        let (mut one, mut other) = (Self::default(), Self::default());
+        let outcomes = std::thread::scope(|scope| {
+            let beside = scope.spawn(|| second(&mut other));
+            let outcome = first(&mut one);
+            let beside = beside.join();
+            [
+                outcome,
+                beside.unwrap_or_else(|_| Err(anyhow::anyhow!("a chore panicked"))),
+            ]
+        });
+        self.0.append(&mut one.0);
+        self.0.append(&mut other.0);
+        outcomes.into_iter().collect()
+    }
+
     /// Red on a terminal that knows colours, and said twice: a test that did not run has not passed.
     pub fn not_run(&mut self, name: &str, why: &str) {
         let line = format!("\x1b[1;31mNOT RUN {name}: {why}\x1b[0m");
