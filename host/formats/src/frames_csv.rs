@@ -1,6 +1,6 @@
 //! `frames.csv`: which frame was taken of what, and where the arms were.
 
-use crate::csv_table::CsvTable;
+use crate::named_table::{NamedRows, NamedTable};
 use crate::{FileError, write_whole};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose, Sample};
@@ -31,31 +31,27 @@ const SAME_POSE_DEG: f64 = 0.03;
 /// outside 0° ≤ θ < 90°, an unknown role, a frame named twice that is no bracket or whose arms
 /// moved, an exposure time that is not positive, or a path that leaves the folder.
 pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let [frame, role, theta_i, phi_i, theta_v, phi_v, file] = [
+    let table = NamedTable::open(path, &["frame", "role", "file"], 5)?;
+    let [frame, role, file] = [
         table.column("frame")?,
         table.column("role")?,
-        table.column("theta_i_deg")?,
-        table.column("phi_i_deg")?,
-        table.column("theta_v_deg")?,
-        table.column("phi_v_deg")?,
         table.column("file")?,
     ];
+    let angles = table.angles()?;
     let exposure = table.optional_column("exposure_s")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut list = FrameList::default();
     let mut places = HashMap::new();
-    while table.next_row()? {
+    let mut table_rows = table.rows();
+    while table_rows.advance()? {
+        let table = &mut table_rows;
         let row = FrameRow {
-            frame: parse_frame(&table, frame)?,
-            role: parse_role(&table, role)?,
-            pose: Pose {
-                light: table.arm_direction(theta_i, phi_i)?,
-                view: table.arm_direction(theta_v, phi_v)?,
-            },
-            file: parse_file(&table, file, folder)?,
+            frame: parse_frame(table, frame)?,
+            role: parse_role(table, role)?,
+            pose: table.pose(angles)?,
+            file: parse_file(table, file, folder)?,
         };
-        let exposure = exposure_of(&table, exposure, &row.file)?;
+        let exposure = exposure_of(table, exposure, &row.file)?;
         let name = format!("{} frame {}", row.role.name(), row.frame);
         match places.entry((row.frame, row.role)) {
             Entry::Vacant(place) => {
@@ -86,14 +82,14 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
 }
 
 fn exposure_of(
-    table: &CsvTable,
+    table: &mut NamedRows<'_>,
     column: Option<usize>,
     file: &str,
 ) -> Result<Option<Exposure>, FileError> {
     let Some(column) = column else {
         return Ok(None);
     };
-    if table.text(column)?.is_empty() {
+    if table.text(column).is_empty() {
         return Ok(None);
     }
     let exposure_s: f64 = table.number(column)?;
@@ -114,7 +110,7 @@ fn is_same(a: Pose, b: Pose) -> bool {
     apart(a.light, b.light) <= SAME_POSE_DEG && apart(a.view, b.view) <= SAME_POSE_DEG
 }
 
-fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
+fn parse_frame(table: &mut NamedRows<'_>, column: usize) -> Result<u32, FileError> {
     match table.number(column)? {
         Sample::NO_FRAME => Err(table.wrong(
             format_args!("frame {} stands for none", Sample::NO_FRAME),
@@ -124,8 +120,8 @@ fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
     }
 }
 
-fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
-    let word = table.text(column)?;
+fn parse_role(table: &NamedRows<'_>, column: usize) -> Result<Role, FileError> {
+    let word = table.text(column);
     let roles = [Role::Material, Role::Reference];
     let role = roles
         .into_iter()
@@ -138,8 +134,8 @@ fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
     })
 }
 
-fn parse_file(table: &CsvTable, column: usize, folder: &Path) -> Result<String, FileError> {
-    let file = table.text(column)?;
+fn parse_file(table: &NamedRows<'_>, column: usize, folder: &Path) -> Result<String, FileError> {
+    let file = table.text(column);
     if file.is_empty() {
         return Err(table.wrong("the file is not named", "give its path inside the folder"));
     }
@@ -367,10 +363,7 @@ mod tests {
                 "1,material,0,0,-1,0,a.exr",
                 "theta_v_deg -1 is not a polar angle",
             ),
-            (
-                "1,material,nan,0,0,0,a.exr",
-                "theta_i_deg NaN is not a polar angle",
-            ),
+            ("1,material,nan,0,0,0,a.exr", "theta_i_deg is NaN"),
             ("1,material,0,inf,0,0,a.exr", "phi_i_deg is inf"),
             ("-1,material,0,0,0,0,a.exr", "frame \"-1\""),
             (
@@ -387,10 +380,7 @@ mod tests {
                 "not inside the capture folder",
             ),
             ("1,material,0,0,0,0,", "the file is not named"),
-            (
-                "1,material,0,0,0,a.exr",
-                "6 fields where the first line names 7",
-            ),
+            ("1,material,0,0,0,a.exr", "6 fields where line 1 names 7"),
             (
                 "0,material,0,0,0,0,b.exr",
                 "material frame 0 is there twice",

@@ -10,7 +10,7 @@
 //! | [`samples`] | samples, in any format of the table |
 //! | [`foreign`] | other groups' measurements, to be imported |
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
-//! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`] | what a session is made by and leaves behind |
+//! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
 //! | [`checksum`] | what ties a note to the file that it was written of |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
@@ -23,13 +23,14 @@ mod capture_folder;
 pub mod cell_mask;
 pub mod checksum;
 mod column_name;
-mod csv_table;
 mod decimal;
 pub mod dense;
 mod dense_exr;
+pub mod directions_csv;
 mod encoding;
 mod error;
 mod error_exr;
+mod exr_blocks;
 mod exr_colours;
 mod exr_header;
 mod exr_planes;
@@ -41,6 +42,7 @@ pub mod frame_exr;
 pub mod frames_csv;
 pub mod masks_csv;
 mod merl;
+mod named_table;
 mod ngan;
 mod npy;
 mod npy_literal;

@@ -1,7 +1,7 @@
 //! `plan.csv`: the poses of a session in travelling order.
 
-use crate::csv_table::CsvTable;
 use crate::frames_csv::Degrees;
+use crate::named_table::NamedTable;
 use crate::{FileError, write_whole};
 use gonia_brdf::Pose;
 use std::io::Write;
@@ -14,27 +14,19 @@ use std::path::Path;
 /// One line naming the file and its line: a missing column, an index out of order, a number that
 /// is none, or a polar angle outside 0° ≤ θ < 90°.
 pub fn read_plan_csv(path: &Path) -> Result<Vec<Pose>, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let [index, theta_i, phi_i, theta_v, phi_v] = [
-        table.column("index")?,
-        table.column("theta_i_deg")?,
-        table.column("phi_i_deg")?,
-        table.column("theta_v_deg")?,
-        table.column("phi_v_deg")?,
-    ];
+    let table = NamedTable::open(path, &["index", "theta_i_deg"], 5)?;
+    let (index, angles) = (table.column("index")?, table.angles()?);
+    let mut rows = table.rows();
     let mut poses = Vec::new();
-    while table.next_row()? {
-        let found: usize = table.number(index)?;
+    while rows.advance()? {
+        let found: usize = rows.number(index)?;
         if found != poses.len() {
-            return Err(table.wrong(
+            return Err(rows.wrong(
                 format_args!("index {found} where {} is due", poses.len()),
                 "make the plan anew, or number its rows from 0",
             ));
         }
-        poses.push(Pose {
-            light: table.arm_direction(theta_i, phi_i)?,
-            view: table.arm_direction(theta_v, phi_v)?,
-        });
+        poses.push(rows.pose(angles)?);
     }
     Ok(poses)
 }
