@@ -1,7 +1,7 @@
 //! `frames.csv`: which frame was taken of what, and where the arms were.
 
 use crate::named_table::{NamedRows, NamedTable};
-use crate::{FileError, write_whole};
+use crate::{FileError, dng, write_whole};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose, Sample};
 use gonia_rig::{Exposure, FrameRow, Role};
@@ -23,8 +23,8 @@ pub struct FrameList {
 const SAME_POSE_DEG: f64 = 0.03;
 
 /// Reads `frames.csv`. Columns are found by name, in any order; others are ignored. Rows with a
-/// number in the optional column `exposure_s` are raw exposures; those of one frame and role make a
-/// bracket.
+/// number in the optional column `exposure_s` are raw exposures, and so are DNGs, which say their own; those
+/// of one frame and role make a bracket.
 ///
 /// # Errors
 /// One line naming the file and its line: a missing column, a number that is none, a polar angle
@@ -51,7 +51,7 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
             pose: table.pose(angles)?,
             file: parse_file(table, file, folder)?,
         };
-        let exposure = exposure_of(table, exposure, &row.file)?;
+        let exposure = exposure_of(table, exposure, &row.file, folder)?;
         let name = format!("{} frame {}", row.role.name(), row.frame);
         match places.entry((row.frame, row.role)) {
             Entry::Vacant(place) => {
@@ -85,13 +85,12 @@ fn exposure_of(
     table: &mut NamedRows<'_>,
     column: Option<usize>,
     file: &str,
+    folder: &Path,
 ) -> Result<Option<Exposure>, FileError> {
-    let Some(column) = column else {
-        return Ok(None);
+    let given = column.filter(|column| !table.text(*column).is_empty());
+    let Some(column) = given else {
+        return own_exposure(table, file, folder);
     };
-    if table.text(column).is_empty() {
-        return Ok(None);
-    }
     let exposure_s: f64 = table.number(column)?;
     if !(exposure_s > 0.0 && exposure_s.is_finite()) {
         return Err(table.wrong(
@@ -99,6 +98,30 @@ fn exposure_of(
             "give seconds above 0, or nothing for a frame of linear radiance",
         ));
     }
+    Ok(Some(Exposure {
+        file: file.to_owned(),
+        exposure_s,
+    }))
+}
+
+/// The exposure time that a DNG says itself; `None` for files of radiance.
+fn own_exposure(
+    table: &NamedRows<'_>,
+    file: &str,
+    folder: &Path,
+) -> Result<Option<Exposure>, FileError> {
+    let ending = Path::new(file).extension().unwrap_or_default();
+    let path = folder.join(file);
+    // A file that is not there is named where all are looked for.
+    if !ending.eq_ignore_ascii_case("dng") || !path.is_file() {
+        return Ok(None);
+    }
+    let Some(exposure_s) = dng::exposure_s(&path)? else {
+        return Err(table.wrong(
+            format_args!("\"{file}\" does not say how long it was exposed"),
+            "give seconds in the column exposure_s",
+        ));
+    };
     Ok(Some(Exposure {
         file: file.to_owned(),
         exposure_s,
@@ -393,6 +416,6 @@ mod tests {
             assert_eq!(error.lines().count(), 1);
         }
         let error = read_text("frame,role\n").unwrap_err().to_string();
-        assert!(error.contains("no column \"theta_i_deg\""), "{error}");
+        assert!(error.contains("no column \"file\""), "{error}");
     }
 }
