@@ -19,6 +19,9 @@ const LINEAR: u64 = 34_892;
 /// The part of a raw image that shows something may be this much smaller than the whole.
 const MOST_OVER_ACTIVE: usize = 4;
 
+/// Photosites of a tile that an image however small may have.
+const TILE: usize = 1 << 20;
+
 /// Problem and remedy.
 type Unusable = (String, &'static str);
 
@@ -249,6 +252,10 @@ impl<'a> Layout<'a> {
         let [Some(wide @ 1..=65_536), Some(high @ 1..=65_536)] = size else {
             return Err(cut());
         };
+        // Tiles reach beyond the image, but not by this much: more than it is made room for.
+        if wide * high > MOST_OVER_ACTIVE * self.width * self.height + TILE {
+            return Err(cut());
+        }
         let across = self.width.div_ceil(wide);
         let down = self.height.div_ceil(high);
         if offsets.len() < across * down || lengths.len() < across * down {

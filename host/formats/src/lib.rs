@@ -74,8 +74,8 @@ mod text_file;
 mod text_lines;
 mod text_table;
 mod text_top;
-pub mod tiff_tags;
-mod toml_text;
+mod tiff_tags;
+pub mod toml_text;
 mod utia;
 mod whole_file;
 
@@ -85,5 +85,6 @@ pub use summary::{
     BinCounts, CellCounts, FileNote, FrameCounts, Pointing, PoseCounts, Refused, Stage, Summary,
 };
 pub use whole_file::{
-    check_output, check_writable, check_writable_beside, write_whole, write_whole_bytes,
+    check_output, check_writable, check_writable_beside, is_same_file, write_whole,
+    write_whole_bytes,
 };

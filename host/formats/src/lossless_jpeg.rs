@@ -58,7 +58,8 @@ pub(super) fn decode(bytes: &[u8], most: usize) -> Option<Samples> {
             0xc3 => headers.frame(segment, most)?,
             0xc4 => headers.huffman(segment)?,
             0xdd => {
-                headers.restart = usize::from(u16::from_be_bytes([segment[0], *segment.get(1)?]))
+                headers.restart =
+                    usize::from(u16::from_be_bytes([*segment.first()?, *segment.get(1)?]))
             }
             0xda => return headers.scan(segment, &bytes[at..]),
             // Another process: lossy, or arithmetic codes.
