@@ -418,4 +418,20 @@ mod tests {
         let error = read_text("frame,role\n").unwrap_err().to_string();
         assert!(error.contains("no column \"file\""), "{error}");
     }
+
+    #[test]
+    fn a_spreadsheets_list_of_frames_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        let text = "Frame;Role;Theta_i [\u{b0}];Phi_i;Theta_v;Phi_v;File;Exposure_s [s]\r\n0;Material;15,5;60;30;90;\"a, b.png\";0,25\r\n;;;;;;;\r\n";
+        let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        std::fs::write(&path, latin1).unwrap();
+        let list = read_frames_csv(&path).unwrap();
+        assert_eq!(
+            (list.rows.len(), list.rows[0].file.as_str()),
+            (1, "a, b.png")
+        );
+        assert_eq!(list.exposures[0][0].exposure_s, 0.25);
+        assert!((list.rows[0].pose.light.theta_deg() - 15.5).abs() < 1e-9);
+    }
 }

@@ -82,4 +82,98 @@ mod tests {
         let error = read_plan_csv(&path).unwrap_err().to_string();
         assert!(error.contains("line 3: index 2 where 1 is due"), "{error}");
     }
+
+    const PLAN: &str =
+        "index,theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg\n0,15.5,60.25,30,90\n1,45,0,60,180.5\n";
+
+    #[test]
+    fn every_dialect_gives_the_same_poses() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("plan.csv");
+        let poses = |bytes: &[u8]| -> Vec<[f64; 4]> {
+            std::fs::write(&path, bytes).unwrap();
+            let of = |Pose { light, view }: &Pose| {
+                let angles = [
+                    light.theta_deg(),
+                    light.phi_deg(),
+                    view.theta_deg(),
+                    view.phi_deg(),
+                ];
+                angles.map(|angle| (angle * 1e6).round() * 1e-6)
+            };
+            read_plan_csv(&path).unwrap().iter().map(of).collect()
+        };
+        let usual = poses(PLAN.as_bytes());
+        assert_eq!(usual.len(), 2);
+        let utf16: Vec<u8> = "\u{feff}"
+            .encode_utf16()
+            .chain(PLAN.encode_utf16())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let german = PLAN
+            .replace(',', ";")
+            .replace('.', ",")
+            .replace('\n', ";\r\n");
+        let radians = |deg: f64| deg.to_radians();
+        let in_radians = format!(
+            "index,theta_i_rad,phi_i_rad,theta_v_rad,phi_v_rad\n0,{},{},{},{}\n1,{},0,{},{}\n",
+            radians(15.5),
+            radians(60.25),
+            radians(30.0),
+            radians(90.0),
+            radians(45.0),
+            radians(60.0),
+            radians(180.5)
+        );
+        for bytes in [
+            utf16,
+            german.into_bytes(),
+            PLAN.replace(',', "\t").into_bytes(),
+            PLAN.replace(',', "  ").into_bytes(),
+            format!("sep=,\n{PLAN}").into_bytes(),
+            format!("Plan of Monday\n\n# {PLAN}").into_bytes(),
+            PLAN.replace("theta_i_deg", "Theta_In [\u{b0}]")
+                .replace("index", "Index")
+                .into_bytes(),
+            in_radians.into_bytes(),
+        ] {
+            assert_eq!(poses(&bytes), usual, "{}", String::from_utf8_lossy(&bytes));
+        }
+    }
+
+    #[test]
+    fn what_is_missing_twice_or_out_of_range_is_named_as_the_file_names_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("plan.csv");
+        for (text, said) in [
+            (
+                PLAN.replace("phi_v_deg", "phi"),
+                "line 1: there is no column \"phi_v_deg\"; found: index, theta_i_deg, phi_i_deg, theta_v_deg, phi;",
+            ),
+            (
+                PLAN.replace("phi_v_deg", "phi_in")
+                    .replace("phi_i_deg", "phi_i"),
+                "phi_i and phi_in are columns of the same quantity",
+            ),
+            (
+                PLAN.replace(',', ";").replace("15.5", "15,5"),
+                "line 2: phi_i_deg \"60.25\" has a decimal point",
+            ),
+            (
+                PLAN.replace("phi_v_deg\n", "phi_v_deg,phi_in\n")
+                    .replace("90\n", "90,1\n"),
+                "line 3: 5 fields where line 1 names 6",
+            ),
+            (
+                PLAN.replace("_deg", "_rad"),
+                "line 2: theta_i_rad 15.5 radians is not a polar angle",
+            ),
+            (String::new(), "the file has no header"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = read_plan_csv(&path).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+            assert_eq!(error.lines().count(), 1);
+        }
+    }
 }

@@ -52,7 +52,7 @@ fn name(bayer: Bayer) -> String {
 fn agreed(path: &Path, rig: &Sensor, own: &FileSensor) -> Result<Sensor, FileError> {
     let tolerance = LEVELS_AGREE * (own.saturation_counts - own.black_counts);
     let contradicts = |what: String, key: &str| {
-        let remedy = format!("mend {key}, or leave it and say what this file is");
+        let remedy = format!("mend {key} in rig.toml");
         Err(FileError::new(path, what, remedy))
     };
     if (rig.black_counts - own.black_counts).abs() > tolerance {

@@ -25,6 +25,9 @@ const KINDS: [(&str, Compression); 9] = [
     ("DWAB", Compression::DWAB(None)),
 ];
 
+/// Poses by their number, seen from above, from 45 and from 75 degrees: writing takes longest.
+const SEEN: [usize; 3] = [0, 3, 6];
+
 /// Prints the table for frames of `px` × `px`.
 pub fn print(px: usize) {
     // One thread, so that its CPU time is all there is.
@@ -38,18 +41,17 @@ fn table(px: usize) {
     println!("|---|---|---|---|---|---|");
     let rig = Rig::paper(px);
     let (registrar, grid) = (Registrar::new(&rig), SamplingGrid::new(&rig));
-    let frames: Vec<Frame> = POSES
-        .map(pose)
-        .into_iter()
-        .enumerate()
-        .map(|(shot, pose)| render(px, Surface::Material, pose, shot as u64))
-        .collect();
+    let shots = SEEN.map(|shot| {
+        let pose = pose(POSES[shot]);
+        (pose, render(px, Surface::Material, pose, shot as u64))
+    });
     let file = std::env::temp_dir().join(format!("gonia-bench-kind-{}.exr", std::process::id()));
     for half in [true, false] {
         for (name, compression) in KINDS {
             let (mut whole, mut read, mut all) = (Vec::new(), Vec::new(), Vec::new());
             let (mut share, mut megabytes) = (Vec::new(), Vec::new());
-            for (frame, pose) in frames.iter().zip(POSES.map(pose)) {
+            for (pose, frame) in &shots {
+                let pose = *pose;
                 write(&file, frame, half, compression);
                 megabytes.push(std::fs::metadata(&file).expect("it is there").len() as f64 * 1e-6);
                 let rows = registrar.rows(pose.view);
