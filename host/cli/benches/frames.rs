@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p gonia --bench frames [-- PX...]` prints a table, a row for each side of the frame in
 //! pixels: CPU time of one thread, the median of several runs for each pose, then the mean over the
-//! poses (in brackets the slowest pose).
+//! poses (in brackets the slowest pose). A second table has a row for each kind of EXR, of the largest
+//! frame: from the file to its samples, by the rows that show the target and by all.
 
 #![allow(clippy::expect_used)]
 
@@ -15,6 +16,7 @@ use gonia_sim::scene::{Scene, SceneGeometry, Surface};
 use std::sync::Arc;
 
 mod clock;
+mod kinds;
 use clock::{mean, median_ms};
 
 /// Poses over the plan's polar angles, one of them with the light's head in the way.
@@ -42,7 +44,7 @@ fn main() {
         "| px | Mpx | decode | register | sample | both | occlusion | paper's 2.5 s over all |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    for px in sizes {
+    for px in sizes.iter().copied() {
         let rig = Rig::paper(px);
         let registrar = Registrar::new(&rig);
         let grid = SamplingGrid::new(&rig);
@@ -75,6 +77,9 @@ fn main() {
             mean(&occlusion),
             PAPER_MS / (decode + both),
         );
+    }
+    if let Some(px) = sizes.into_iter().max() {
+        kinds::print(px);
     }
 }
 

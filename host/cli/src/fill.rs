@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
 use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense, write_error_bars};
 use gonia_formats::samples::read_samples_of_all;
-use gonia_formats::{check_output, checksum};
+use gonia_formats::{check_output, checksum, is_same_file};
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{
     DirectionalAlbedo, FillCounts, FillMethod, FillOptions, Filled, fill, fill_to_file,
@@ -104,7 +104,7 @@ impl Fill {
             check_output(output, &inputs)?;
         }
         if let Some(error) = &self.error
-            && *error == self.output
+            && is_same_file(error, &self.output)
         {
             bail!(
                 "--error {}: is the output too; give another name",
@@ -123,7 +123,8 @@ impl Fill {
             samples: read.samples,
             scale: read.scale.unwrap_or(Scale::Relative),
         };
-        let facts = Provenance::from([("samples".to_owned(), names.clone())]);
+        let mut facts = read.provenance;
+        facts.insert("samples".to_owned(), names.clone());
         let mut rows = if options.fits_memory()? {
             let filled =
                 fill(samples, &options, &progress.watch()).with_context(|| names.clone())?;

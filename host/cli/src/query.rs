@@ -1,18 +1,15 @@
 //! `gonia query`: values at any directions.
 
 use crate::{remarks, say};
-use anyhow::{Context, Result, bail};
-use csv::StringRecord;
+use anyhow::{Context, Result};
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
+use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
 use gonia_rig::Remark;
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::io::{BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
 
-/// The columns that are read, in the order they are written.
-const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_v", "phi_v"];
-
-/// Reads directions from standard input (CSV with the columns theta_i, phi_i, theta_v, phi_v, in
+/// Reads directions from standard input (a table with the columns theta_i, phi_i, theta_v, phi_v, in
 /// degrees) and writes them with r, g, b, interpolated between the nodes.
 #[derive(clap::Args)]
 #[command(
@@ -27,31 +24,22 @@ impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let mut brdf = DenseLookup::open(&self.dense)?;
-        let mut input = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(std::io::stdin().lock());
-        let header = input.headers().context("standard input, line 1")?.clone();
-        let mut columns = [0; 4];
-        for (name, column) in ANGLES.iter().zip(&mut columns) {
-            *column = header.iter().position(|h| h == *name).with_context(|| {
-                format!(
-                    "standard input, line 1: no column {name}; begin with the header {}",
-                    ANGLES.join(",")
-                )
-            })?;
-        }
+        let place = Path::new("standard input");
+        let mut bytes = Vec::new();
+        std::io::stdin()
+            .lock()
+            .read_to_end(&mut bytes)
+            .with_context(|| place.display().to_string())?;
+        let rows = read_directions(place, bytes)?;
         let mut beyond = Beyond::of(brdf.grid());
         let mut out = BufWriter::new(std::io::stdout().lock());
         let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
-        for record in input.records() {
+        for row in rows {
             if said.is_err() {
                 break;
             }
-            let record = record.context("standard input")?;
-            let line = record.position().map_or(0, |p| p.line());
-            let angles = angles_of(&record, &columns, line)?;
-            let [theta_i, phi_i, theta_v, phi_v] = angles;
-            beyond.count(angles, line);
+            let [theta_i, phi_i, theta_v, phi_v] = row.angles_deg;
+            beyond.count(row);
             let [r, g, b] = brdf.lookup(
                 Direction::from_deg(theta_i, phi_i),
                 Direction::from_deg(theta_v, phi_v),
@@ -64,41 +52,13 @@ impl Query {
     }
 }
 
-/// The four angles of a row, degrees.
-fn angles_of(record: &StringRecord, columns: &[usize; 4], line: u64) -> Result<[f64; 4]> {
-    let mut angles = [0.0f64; 4];
-    for (k, name) in ANGLES.into_iter().enumerate() {
-        let text = record.get(columns[k]).unwrap_or_default();
-        angles[k] = match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => value,
-            _ => bail!(
-                "standard input, line {line}: '{text}' in column {name} is not a number of degrees; \
-                 give one, with a point for decimals"
-            ),
-        };
-        let is_polar = name.starts_with("theta");
-        if is_polar && !(0.0..=90.0).contains(&angles[k]) {
-            let remedy = match angles[k] {
-                theta if (-90.0..0.0).contains(&theta) => {
-                    "give its size, and the azimuth plus 180 degrees"
-                }
-                _ => "give degrees from the normal",
-            };
-            bail!(
-                "standard input, line {line}: {name} = {text} is not a polar angle in 0..=90 degrees; {remedy}"
-            );
-        }
-    }
-    Ok(angles)
-}
-
 /// Directions beyond the grid's last polar angle, which have its value.
 struct Beyond {
     last_deg: f64,
     asked: usize,
     beyond: usize,
     /// The line, the column and the polar angle of the first.
-    first: Option<(u64, &'static str, f64)>,
+    first: Option<(usize, &'static str, f64)>,
 }
 
 impl Beyond {
@@ -111,7 +71,8 @@ impl Beyond {
         }
     }
 
-    fn count(&mut self, [theta_i, _, theta_v, _]: [f64; 4], line: u64) {
+    fn count(&mut self, row: DirectionRow) {
+        let [theta_i, _, theta_v, _] = row.angles_deg;
         // Angles that were radians once may be off in their last digits.
         let is_beyond = |theta: f64| theta > self.last_deg + 1e-6;
         let found = [(ANGLES[0], theta_i), (ANGLES[2], theta_v)]
@@ -120,7 +81,7 @@ impl Beyond {
         self.asked += 1;
         if let Some((name, theta)) = found {
             self.beyond += 1;
-            self.first.get_or_insert((line, name, theta));
+            self.first.get_or_insert((row.line, name, theta));
         }
     }
 

@@ -23,6 +23,8 @@ use gonia_sim::scene::{RawSensor, Scene, SceneGeometry};
 use std::fs::{self, File};
 use std::path::Path;
 use std::sync::{Arc, LazyLock, Mutex};
+use tiff::encoder::TiffEncoder;
+use tiff::tags::Tag;
 
 const PX: usize = 200;
 const ALBEDO: [f64; 3] = [0.5, 0.9, 0.7];
@@ -99,6 +101,46 @@ fn write_raws(folder: &Path, times: &[f64], pattern: Option<Bayer>, told: Option
         }
     }
     fs::write(folder.join("frames.csv"), csv).unwrap();
+}
+
+/// The same of a mosaic, as DNGs of half a second each, which say this black level.
+fn write_dngs(folder: &Path, black: u16) {
+    write_raws(folder, &[0.5], Some(Bayer::Grbg), None);
+    let list = folder.join("frames.csv");
+    let csv = fs::read_to_string(&list).unwrap();
+    fs::write(&list, csv.replace(".png,0.5", ".dng,")).unwrap();
+    for path in fs::read_dir(folder)
+        .unwrap()
+        .map(|item| item.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+    {
+        let raw = gonia_formats::raw_frame::read_raw(&path, PX, PX)
+            .unwrap()
+            .raw;
+        let file = File::create(path.with_extension("dng")).unwrap();
+        let mut file = TiffEncoder::new(file).unwrap();
+        let mut image = file
+            .new_image::<tiff::encoder::colortype::Gray16>(PX as u32, PX as u32)
+            .unwrap();
+        let tags = image.encoder();
+        let tag = Tag::Unknown;
+        let range = 3900.0 - f64::from(black);
+        let gain = 2.5;
+        // Shot and read noise of the sensor, of values from 0 to 1.
+        let noise = [1.0 / (gain * range), (4.0 / gain / range).powi(2)];
+        tags.write_tag(tag(50_706), &[1u8, 4, 0, 0][..]).unwrap();
+        tags.write_tag(Tag::PhotometricInterpretation, 32_803u16)
+            .unwrap();
+        tags.write_tag(tag(33_421), &[2u16, 2][..]).unwrap();
+        tags.write_tag(tag(33_422), &[1u8, 0, 2, 1][..]).unwrap();
+        tags.write_tag(tag(50_714), black).unwrap();
+        tags.write_tag(tag(50_717), 3900u16).unwrap();
+        tags.write_tag(tag(51_041), &noise[..]).unwrap();
+        tags.write_tag(tag(33_434), tiff::encoder::Rational { n: 1, d: 2 })
+            .unwrap();
+        image.write_data(&raw.counts).unwrap();
+        fs::remove_file(path).unwrap();
+    }
 }
 
 fn expose(frame: &Frame, time: f64, pattern: Option<Bayer>) -> RawFrame {
@@ -433,7 +475,28 @@ fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
             fs::write(list, csv).unwrap();
         },
     );
+    let spreadsheet = process("`frames.csv` of a German spreadsheet", |folder| {
+        write_exrs(folder);
+        let list = folder.join("frames.csv");
+        let csv = fs::read_to_string(&list).unwrap();
+        let csv = csv
+            .replace(',', ";")
+            .replace("theta_i_deg;phi_i_deg", "Theta_in [°];Phi_in [°]")
+            .replace("frame;role", "Frame;Role")
+            .replace(";30;60;30;185;", ";30,0;60,0;30,0;185,0;")
+            .replace('\n', ";\r\n");
+        // Latin-1, as older spreadsheets save it.
+        fs::write(list, csv.chars().map(|c| c as u8).collect::<Vec<u8>>()).unwrap();
+    });
+    let nameless = process("`frames.csv` with a column of another name", |folder| {
+        write_exrs(folder);
+        let list = folder.join("frames.csv");
+        let csv = fs::read_to_string(&list).unwrap();
+        fs::write(list, csv.replace("theta_v_deg", "tilt")).unwrap();
+    });
     vec![
+        spreadsheet.read_as(sound),
+        nameless.refused(&["there is no column \"theta_v_deg\"; found: frame, role, theta_i_deg"]),
         wrong_size(true).refused(&[size]),
         wrong_size(false).used(&["material frame 0: is left out", size]),
         turned(
@@ -536,6 +599,27 @@ fn raw_exposures(sound: &[Sample]) -> Vec<Case> {
         )
         .unwrap();
     });
+    let dng = process(
+        "DNGs of a mosaic, without [sensor] and exposure_s",
+        |folder| {
+            write_dngs(folder, 64);
+            let rig = Rig {
+                sensor: None,
+                ..rig()
+            };
+            write_rig(&folder.join("rig.toml"), &rig).unwrap();
+        },
+    );
+    expect(dng.case.said().is_empty(), dng.case.said());
+    let ratios = dng.samples.iter().flatten().zip(sound);
+    let ratios: Vec<f32> = ratios
+        .map(|(a, b)| (a.rgb[1] / b.rgb[1]).natural_log())
+        .collect();
+    let bias = ratios.iter().sum::<f32>() / ratios.len() as f32;
+    expect(bias.abs() < 0.01, &format!("DNGs: bias {bias}"));
+    let dark = process("DNGs whose black level is not that of rig.toml", |folder| {
+        write_dngs(folder, 512)
+    });
     let no_time = process("PNGs without exposure_s", |folder| {
         raws(folder, &[0.5]);
         let list = folder.join("frames.csv");
@@ -569,7 +653,14 @@ fn raw_exposures(sound: &[Sample]) -> Vec<Case> {
             "warning: reference: under the weakest light",
             "check black_counts",
         ]),
-        canon.used(&["material frame 0: is left out", "Canon CR2", "dcraw"]),
+        dng.case,
+        dark.refused(&["says that it is black at 512 counts, but rig.toml says 64"]),
+        canon.used(&[
+            "material frame 0: is left out",
+            "Canon CR2",
+            "convert it to DNG",
+            "dcraw",
+        ]),
         no_time.refused(&["give its exposure time in the column exposure_s"]),
     ]
 }

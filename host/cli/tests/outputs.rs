@@ -118,6 +118,8 @@ fn scales(bench: &mut Bench) {
     assert_eq!(scale(bench), Scale::Absolute);
     let came_in = "samples.npy with its note, samples.npy.toml";
     bench.case(came_in, &fill(&["@absolute.npy"], &[]), "", 0, &as_said);
+    let filled = read_dense(&bench.at("filled.exr")).unwrap();
+    assert_eq!(filled.provenance["samples.made_by"], "a test");
     assert_eq!(scale(bench), Scale::Absolute);
     let came_in = "samples that do not say their scale";
     bench.case(
@@ -354,6 +356,20 @@ fn queries(bench: &mut Bench) {
         0,
         &[],
     );
+    bench.case(
+        "query of a German spreadsheet with other names",
+        &query,
+        "Theta_in [°];Phi_in [°];Theta_out [°];Phi_out [°]\r\n30,5;0;59,5;10\r\n",
+        0,
+        &[],
+    );
+    bench.case(
+        "query of directions without a header",
+        &query,
+        "30,0,60,0\n",
+        1,
+        &["there is no column", "the file has no header"],
+    );
     let rows = format!("{header}30,0,60,0\n30,0,88,0\n90,0,90,0\n");
     let said = [
         "warning: standard input: 2 of 3 directions lie beyond",
@@ -369,7 +385,8 @@ fn queries(bench: &mut Bench) {
     for (row, word) in [
         ("91,0,0,0", "theta_i = 91 is not a polar angle"),
         ("30,0,-20,0", "the azimuth plus 180 degrees"),
-        ("nan,0,0,0", "'nan' in column theta_i is not a number"),
+        ("nan,0,0,0", "theta_i is NaN"),
+        ("x,0,0,0", "theta_i \"x\" is not a number"),
     ] {
         let came_in = format!("query of `{row}`");
         bench.case(&came_in, &query, &format!("{header}{row}\n"), 1, &[word]);
@@ -495,6 +512,23 @@ fn outputs(bench: &mut Bench) {
         let came_in = format!("`fill -o {}`", output.trim_start_matches('@'));
         bench.case(&came_in, &fill(output), "", 1, &[word]);
     }
+    let twice = [
+        "fill",
+        "@silent.npy",
+        "-o",
+        "@x.exr",
+        "--error",
+        "@there/../x.exr",
+        "--step",
+        "15",
+    ];
+    bench.case(
+        "`fill -o x.exr --error there/../x.exr`",
+        &twice,
+        "",
+        1,
+        &["x.exr: is the output too"],
+    );
     let step = ["fill", "@silent.npy", "-o", "@x.exr", "--step", "45"];
     bench.case(
         "`fill --step 45`",

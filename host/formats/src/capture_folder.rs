@@ -1,11 +1,12 @@
 //! A capture folder: `rig.toml`, `frames.csv` and the frames they speak of.
 
 use crate::FileError;
-use crate::frame_exr::read_frame_of_size;
+use crate::frame_exr::read_frame_rows;
 use crate::frames_csv::{FrameList, read_frames_csv};
 use crate::rig_toml::read_rig;
 use gonia_rig::{Exposure, Frame, FrameRow, Rig, Role};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The frames of a session of any rig, to be loaded one by one.
@@ -98,10 +99,19 @@ impl CaptureFolder {
     /// `gonia_pipeline::bracket`). Frames may be loaded from many threads at once.
     ///
     /// # Errors
-    /// One line naming the file: see [`read_frame_of_size`].
+    /// One line naming the file: see [`read_frame_of_size`](crate::frame_exr::read_frame_of_size).
     pub fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
+        self.load_rows(row, 0..self.rig.camera.height_px)
+    }
+
+    /// As [`CaptureFolder::load`], of a frame of which only some rows are needed: the others may be NaN.
+    ///
+    /// # Errors
+    /// As [`CaptureFolder::load`].
+    pub fn load_rows(&self, row: &FrameRow, rows: Range<usize>) -> Result<Frame, FileError> {
         let camera = &self.rig.camera;
-        read_frame_of_size(&self.path_of(row), camera.width_px, camera.height_px)
+        let size = [camera.width_px, camera.height_px];
+        read_frame_rows(&self.path_of(row), size, rows)
     }
 }
 

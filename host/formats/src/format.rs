@@ -88,6 +88,8 @@ pub struct SamplesRead {
     pub samples: Vec<Sample>,
     /// Whether their values are 1/sr, where the file says so.
     pub scale: Option<Scale>,
+    /// Where they came from, by name, where a note says it that was written of these samples.
+    pub provenance: BTreeMap<String, String>,
     /// What was assumed of the file, and what in it cannot be trusted.
     pub remarks: Vec<Remark>,
 }

@@ -2,10 +2,8 @@
 
 use crate::exr_planes::{ExrPlanes, Plane, unreadable};
 use crate::raw_frame::looks_raw;
-use crate::{FileError, exr_colours, exr_planes};
-use exr::block::UncompressedBlock;
+use crate::{FileError, exr_blocks, exr_colours, exr_planes};
 use exr::block::lines::LineRef;
-use exr::block::reader::ChunksReader;
 use exr::math::Vec2;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
@@ -15,6 +13,7 @@ use half::slice::HalfFloatSliceExt;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
+use std::ops::Range;
 use std::path::Path;
 
 /// Radiance below this is no noise around zero any more, but a broken file.
@@ -33,7 +32,7 @@ const CLAIM_RATIO: u64 = 4096;
 /// without colours (see [`read_frame_of_size`]), or with values that are no radiance (NaN, below
 /// −10⁶). +∞ is one: a saturated pixel.
 pub fn read_frame(path: &Path) -> Result<Frame, FileError> {
-    read_placed(path, |header, file_bytes| {
+    read_placed(path, None, |header, file_bytes| {
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
         let claimed = 12 * width as u64 * height as u64;
         if claimed > CLAIM_BYTES && claimed / CLAIM_RATIO > file_bytes {
@@ -58,6 +57,20 @@ pub fn read_frame(path: &Path) -> Result<Frame, FileError> {
 /// As [`read_frame`]; and when its size is another, its data window lies outside of it, or colours are
 /// missing or in several layers.
 pub fn read_frame_of_size(path: &Path, width: usize, height: usize) -> Result<Frame, FileError> {
+    read_frame_rows(path, [width, height], 0..height)
+}
+
+/// As [`read_frame_of_size`], of a frame of width × height pixels of which only some rows are needed:
+/// blocks of the file that show none of them are neither read nor decoded, and their pixels are NaN.
+///
+/// # Errors
+/// As [`read_frame_of_size`]; but what is wrong with blocks that are not read is not seen.
+pub fn read_frame_rows(
+    path: &Path,
+    size: [usize; 2],
+    rows: Range<usize>,
+) -> Result<Frame, FileError> {
+    let [width, height] = size;
     if looks_raw(path) {
         return Err(FileError::new(
             path,
@@ -65,7 +78,7 @@ pub fn read_frame_of_size(path: &Path, width: usize, height: usize) -> Result<Fr
             "give its exposure time in the column exposure_s of frames.csv",
         ));
     }
-    read_placed(path, |header, _| {
+    read_placed(path, Some(rows), |header, _| {
         let display = header.shared_attributes.display_window;
         let data = header.layer_size;
         let position = header.own_attributes.layer_position;
@@ -132,6 +145,7 @@ struct Reading {
 
 fn read_placed(
     path: &Path,
+    rows: Option<Range<usize>>,
     place: impl FnOnce(&Header, u64) -> Result<Placement, (String, String)>,
 ) -> Result<Frame, FileError> {
     let refused = |(problem, remedy): (String, String)| FileError::new(path, problem, remedy);
@@ -148,41 +162,45 @@ fn read_placed(
         return Err(refused((problem, "check the file".into())));
     }
     let Placement { size, from } = place(header, bytes).map_err(refused)?;
-    let [width, height] = size;
-    let covers = |i: usize, side: usize| from[i] <= 0 && from[i] + side as i64 >= size[i] as i64;
-    let is_whole = covers(0, data.width()) && covers(1, data.height());
-    let unseen = if is_whole { 0.0 } else { f32::NAN };
+    let rows = rows.unwrap_or(0..size[1]);
     let mut read = Reading {
-        frame: Frame {
-            width,
-            height,
-            rgb: vec![[unseen; 3]; width * height],
-        },
+        frame: blank(size, from, [data.width(), data.height()], &rows),
         from,
         wrong: None,
         halves: Vec::new(),
         values: Vec::new(),
     };
-    let of_frame = |layer, level| layer == colours.part && level == Vec2(0, 0);
-    reader
-        .filter_chunks(false, |_, _, block| of_frame(block.layer, block.level))
-        .and_then(|chunks| {
-            chunks.decompress_parallel(false, |meta, block: UncompressedBlock| {
-                let channels = &meta.headers[colours.part].channels;
-                for line in block.lines(channels) {
-                    let index = line.location.channel;
-                    let kind = channels.list.get(index).map(|channel| channel.sample_type);
-                    let targets = (0..3).filter(|c| colours.channels[*c] == index);
-                    read.line(&line, kind, targets)?;
-                }
-                Ok(())
-            })
-        })
-        .map_err(|error| unreadable(path, error))?;
+    let within = |row: usize| (row as i64 - from[1]).clamp(0, data.height() as i64) as usize;
+    let needed = within(rows.start)..within(rows.end);
+    exr_blocks::each(reader, colours.part, needed, |meta, block| {
+        let channels = &meta.headers[colours.part].channels;
+        for line in block.lines(channels) {
+            let index = line.location.channel;
+            let kind = channels.list.get(index).map(|channel| channel.sample_type);
+            let targets = (0..3).filter(|c| colours.channels[*c] == index);
+            read.line(&line, kind, targets)?;
+        }
+        Ok(())
+    })
+    .map_err(|error| unreadable(path, error))?;
     match read.wrong {
         Some(wrong) => Err(no_radiance(path, wrong)),
         None => Ok(read.frame),
     }
+}
+
+/// A frame whose data window begins at `from`, before it is read: NaN where nothing will be.
+fn blank(size: [usize; 2], from: [i64; 2], data: [usize; 2], rows: &Range<usize>) -> Frame {
+    let [width, height] = size;
+    let covers = |i: usize| from[i] <= 0 && from[i] + data[i] as i64 >= size[i] as i64;
+    let is_whole = covers(0) && covers(1);
+    let unseen = if is_whole { 0.0 } else { f32::NAN };
+    let mut rgb = vec![[unseen; 3]; width * height];
+    let (above, rest) = rgb.split_at_mut(rows.start.min(height) * width);
+    let below = (rows.end.min(height) * width).saturating_sub(above.len());
+    above.fill([f32::NAN; 3]);
+    rest[below..].fill([f32::NAN; 3]);
+    Frame { width, height, rgb }
 }
 
 impl Reading {
@@ -594,6 +612,61 @@ mod tests {
             error.contains("is 4 × 3 pixels, but the rig's camera has 5 × 3"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn rows_that_are_needed_are_those_of_the_whole_frame_in_every_encoding() {
+        use exr::prelude::{Blocks, Compression, LineOrder};
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let size = [40, 300];
+        let encodings = [
+            (Compression::Uncompressed, Blocks::ScanLines),
+            (Compression::RLE, Blocks::ScanLines),
+            (Compression::ZIP1, Blocks::ScanLines),
+            (Compression::ZIP16, Blocks::ScanLines),
+            (Compression::PIZ, Blocks::ScanLines),
+            (Compression::PXR24, Blocks::ScanLines),
+            (Compression::ZIP16, Blocks::Tiles(Vec2(16, 8))),
+        ];
+        for (compression, blocks) in encodings {
+            for line_order in [LineOrder::Increasing, LineOrder::Decreasing] {
+                let encoding = Encoding {
+                    compression,
+                    blocks,
+                    line_order,
+                };
+                let channels = [AnyChannel::new("Y", floats(size, 1.0))];
+                let channels = AnyChannels::sort(channels.into_iter().collect());
+                let attributes = LayerAttributes::default().with_position(Vec2(0, 5));
+                let layer = Layer::new((40, 300), attributes, encoding, channels);
+                let display = IntegerBounds::new((0, 0), (40, 310));
+                Image::from_layers(ImageAttributes::new(display), vec![layer])
+                    .write()
+                    .to_file(&path)
+                    .unwrap();
+                let whole = read_frame_of_size(&path, 40, 310).unwrap();
+                assert_eq!(whole.rgb[5 * 40][0], 1.0);
+                for rows in [0..310, 137..138, 150..180, 0..3, 306..310, 20..20] {
+                    let some = read_frame_rows(&path, [40, 310], rows.clone()).unwrap();
+                    for row in 0..310 {
+                        let of = |frame: &Frame| -> Vec<u32> {
+                            let pixels = &frame.rgb[row * 40..(row + 1) * 40];
+                            pixels.iter().map(|pixel| pixel[0].to_bits()).collect()
+                        };
+                        let unread = some.rgb[row * 40][0].is_nan() && !rows.contains(&row);
+                        assert!(unread || of(&some) == of(&whole), "{row} of {rows:?}");
+                    }
+                    // Most of what is not needed is not read.
+                    let missing = some.rgb.iter().filter(|p| p[0].is_nan()).count();
+                    assert!(missing / 40 + rows.len() >= 150, "{rows:?}: {missing}");
+                }
+                let bytes = std::fs::read(&path).unwrap();
+                std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+                let error = read_frame_rows(&path, [40, 310], 150..151).unwrap_err();
+                assert!(error.to_string().contains("cut short"), "{error}");
+            }
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `frames.csv`: which frame was taken of what, and where the arms were.
 
-use crate::csv_table::CsvTable;
-use crate::{FileError, write_whole};
+use crate::named_table::{NamedRows, NamedTable};
+use crate::{FileError, dng, write_whole};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose, Sample};
 use gonia_rig::{Exposure, FrameRow, Role};
@@ -23,39 +23,35 @@ pub struct FrameList {
 const SAME_POSE_DEG: f64 = 0.03;
 
 /// Reads `frames.csv`. Columns are found by name, in any order; others are ignored. Rows with a
-/// number in the optional column `exposure_s` are raw exposures; those of one frame and role make a
-/// bracket.
+/// number in the optional column `exposure_s` are raw exposures, and so are DNGs, which say their own; those
+/// of one frame and role make a bracket.
 ///
 /// # Errors
 /// One line naming the file and its line: a missing column, a number that is none, a polar angle
 /// outside 0° ≤ θ < 90°, an unknown role, a frame named twice that is no bracket or whose arms
 /// moved, an exposure time that is not positive, or a path that leaves the folder.
 pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let [frame, role, theta_i, phi_i, theta_v, phi_v, file] = [
+    let table = NamedTable::open(path, &["frame", "role", "file"], 5)?;
+    let [frame, role, file] = [
         table.column("frame")?,
         table.column("role")?,
-        table.column("theta_i_deg")?,
-        table.column("phi_i_deg")?,
-        table.column("theta_v_deg")?,
-        table.column("phi_v_deg")?,
         table.column("file")?,
     ];
+    let angles = table.angles()?;
     let exposure = table.optional_column("exposure_s")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut list = FrameList::default();
     let mut places = HashMap::new();
-    while table.next_row()? {
+    let mut table_rows = table.rows();
+    while table_rows.advance()? {
+        let table = &mut table_rows;
         let row = FrameRow {
-            frame: parse_frame(&table, frame)?,
-            role: parse_role(&table, role)?,
-            pose: Pose {
-                light: table.arm_direction(theta_i, phi_i)?,
-                view: table.arm_direction(theta_v, phi_v)?,
-            },
-            file: parse_file(&table, file, folder)?,
+            frame: parse_frame(table, frame)?,
+            role: parse_role(table, role)?,
+            pose: table.pose(angles)?,
+            file: parse_file(table, file, folder)?,
         };
-        let exposure = exposure_of(&table, exposure, &row.file)?;
+        let exposure = exposure_of(table, exposure, &row.file, folder)?;
         let name = format!("{} frame {}", row.role.name(), row.frame);
         match places.entry((row.frame, row.role)) {
             Entry::Vacant(place) => {
@@ -86,16 +82,15 @@ pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
 }
 
 fn exposure_of(
-    table: &CsvTable,
+    table: &mut NamedRows<'_>,
     column: Option<usize>,
     file: &str,
+    folder: &Path,
 ) -> Result<Option<Exposure>, FileError> {
-    let Some(column) = column else {
-        return Ok(None);
+    let given = column.filter(|column| !table.text(*column).is_empty());
+    let Some(column) = given else {
+        return own_exposure(table, file, folder);
     };
-    if table.text(column)?.is_empty() {
-        return Ok(None);
-    }
     let exposure_s: f64 = table.number(column)?;
     if !(exposure_s > 0.0 && exposure_s.is_finite()) {
         return Err(table.wrong(
@@ -109,12 +104,36 @@ fn exposure_of(
     }))
 }
 
+/// The exposure time that a DNG says itself; `None` for files of radiance.
+fn own_exposure(
+    table: &NamedRows<'_>,
+    file: &str,
+    folder: &Path,
+) -> Result<Option<Exposure>, FileError> {
+    let ending = Path::new(file).extension().unwrap_or_default();
+    let path = folder.join(file);
+    // A file that is not there is named where all are looked for.
+    if !ending.eq_ignore_ascii_case("dng") || !path.is_file() {
+        return Ok(None);
+    }
+    let Some(exposure_s) = dng::exposure_s(&path)? else {
+        return Err(table.wrong(
+            format_args!("\"{file}\" does not say how long it was exposed"),
+            "give seconds in the column exposure_s",
+        ));
+    };
+    Ok(Some(Exposure {
+        file: file.to_owned(),
+        exposure_s,
+    }))
+}
+
 fn is_same(a: Pose, b: Pose) -> bool {
     let apart = |a: Direction, b: Direction| angle_between(a.to_vec3(), b.to_vec3()).to_degrees();
     apart(a.light, b.light) <= SAME_POSE_DEG && apart(a.view, b.view) <= SAME_POSE_DEG
 }
 
-fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
+fn parse_frame(table: &mut NamedRows<'_>, column: usize) -> Result<u32, FileError> {
     match table.number(column)? {
         Sample::NO_FRAME => Err(table.wrong(
             format_args!("frame {} stands for none", Sample::NO_FRAME),
@@ -124,8 +143,8 @@ fn parse_frame(table: &CsvTable, column: usize) -> Result<u32, FileError> {
     }
 }
 
-fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
-    let word = table.text(column)?;
+fn parse_role(table: &NamedRows<'_>, column: usize) -> Result<Role, FileError> {
+    let word = table.text(column);
     let roles = [Role::Material, Role::Reference];
     let role = roles
         .into_iter()
@@ -138,8 +157,8 @@ fn parse_role(table: &CsvTable, column: usize) -> Result<Role, FileError> {
     })
 }
 
-fn parse_file(table: &CsvTable, column: usize, folder: &Path) -> Result<String, FileError> {
-    let file = table.text(column)?;
+fn parse_file(table: &NamedRows<'_>, column: usize, folder: &Path) -> Result<String, FileError> {
+    let file = table.text(column);
     if file.is_empty() {
         return Err(table.wrong("the file is not named", "give its path inside the folder"));
     }
@@ -367,10 +386,7 @@ mod tests {
                 "1,material,0,0,-1,0,a.exr",
                 "theta_v_deg -1 is not a polar angle",
             ),
-            (
-                "1,material,nan,0,0,0,a.exr",
-                "theta_i_deg NaN is not a polar angle",
-            ),
+            ("1,material,nan,0,0,0,a.exr", "theta_i_deg is NaN"),
             ("1,material,0,inf,0,0,a.exr", "phi_i_deg is inf"),
             ("-1,material,0,0,0,0,a.exr", "frame \"-1\""),
             (
@@ -387,10 +403,7 @@ mod tests {
                 "not inside the capture folder",
             ),
             ("1,material,0,0,0,0,", "the file is not named"),
-            (
-                "1,material,0,0,0,a.exr",
-                "6 fields where the first line names 7",
-            ),
+            ("1,material,0,0,0,a.exr", "6 fields where line 1 names 7"),
             (
                 "0,material,0,0,0,0,b.exr",
                 "material frame 0 is there twice",
@@ -403,6 +416,22 @@ mod tests {
             assert_eq!(error.lines().count(), 1);
         }
         let error = read_text("frame,role\n").unwrap_err().to_string();
-        assert!(error.contains("no column \"theta_i_deg\""), "{error}");
+        assert!(error.contains("no column \"file\""), "{error}");
+    }
+
+    #[test]
+    fn a_spreadsheets_list_of_frames_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frames.csv");
+        let text = "Frame;Role;Theta_i [\u{b0}];Phi_i;Theta_v;Phi_v;File;Exposure_s [s]\r\n0;Material;15,5;60;30;90;\"a, b.png\";0,25\r\n;;;;;;;\r\n";
+        let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        std::fs::write(&path, latin1).unwrap();
+        let list = read_frames_csv(&path).unwrap();
+        assert_eq!(
+            (list.rows.len(), list.rows[0].file.as_str()),
+            (1, "a, b.png")
+        );
+        assert_eq!(list.exposures[0][0].exposure_s, 0.25);
+        assert!((list.rows[0].pose.light.theta_deg() - 15.5).abs() < 1e-9);
     }
 }

@@ -10,7 +10,7 @@
 //! | [`samples`] | samples, in any format of the table |
 //! | [`foreign`] | other groups' measurements, to be imported |
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
-//! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`] | what a session is made by and leaves behind |
+//! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
 //! | [`checksum`] | what ties a note to the file that it was written of |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
@@ -23,13 +23,15 @@ mod capture_folder;
 pub mod cell_mask;
 pub mod checksum;
 mod column_name;
-mod csv_table;
 mod decimal;
 pub mod dense;
 mod dense_exr;
+pub mod directions_csv;
+mod dng;
 mod encoding;
 mod error;
 mod error_exr;
+mod exr_blocks;
 mod exr_colours;
 mod exr_header;
 mod exr_planes;
@@ -39,8 +41,10 @@ pub mod foreign;
 mod format;
 pub mod frame_exr;
 pub mod frames_csv;
+mod lossless_jpeg;
 pub mod masks_csv;
 mod merl;
+mod named_table;
 mod ngan;
 mod npy;
 mod npy_literal;
@@ -70,6 +74,7 @@ mod text_file;
 mod text_lines;
 mod text_table;
 mod text_top;
+mod tiff_tags;
 pub mod toml_text;
 mod utia;
 mod whole_file;
@@ -80,5 +85,6 @@ pub use summary::{
     BinCounts, CellCounts, FileNote, FrameCounts, Pointing, PoseCounts, Refused, Stage, Summary,
 };
 pub use whole_file::{
-    check_output, check_writable, check_writable_beside, write_whole, write_whole_bytes,
+    check_output, check_writable, check_writable_beside, is_same_file, write_whole,
+    write_whole_bytes,
 };

@@ -1,7 +1,7 @@
 //! `masks.csv`: what hid the target at each pose of the reference, for other materials.
 
-use crate::csv_table::CsvTable;
 use crate::frames_csv::Degrees;
+use crate::named_table::NamedTable;
 use crate::{FileError, write_whole};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -25,24 +25,22 @@ pub struct MaskRow {
 /// One line naming the file and its line: a missing column, a number that is none, frames of another
 /// size or focal length, or a mask that is not base64.
 pub fn read_masks_csv(path: &Path, rig: &Rig) -> Result<Vec<MaskRow>, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let [theta_i, phi_i, theta_v, phi_v, width, height, focal, mask] = [
-        table.column("theta_i_deg")?,
-        table.column("phi_i_deg")?,
-        table.column("theta_v_deg")?,
-        table.column("phi_v_deg")?,
+    let table = NamedTable::open(path, &["theta_i_deg", "width_px", "mask"], 7)?;
+    let angles = table.angles()?;
+    let [width, height, focal, mask] = [
         table.column("width_px")?,
         table.column("height_px")?,
         table.column("focal_px")?,
         table.column("mask")?,
     ];
     let camera = &rig.camera;
-    let mut rows = Vec::new();
-    while table.next_row()? {
-        let size: [usize; 2] = [table.number(width)?, table.number(height)?];
-        let focal_px: f64 = table.number(focal)?;
+    let mut masks = Vec::new();
+    let mut rows = table.rows();
+    while rows.advance()? {
+        let size: [usize; 2] = [rows.number(width)?, rows.number(height)?];
+        let focal_px: f64 = rows.number(focal)?;
         if size != [camera.width_px, camera.height_px] || focal_px != camera.focal_px {
-            return Err(table.wrong(
+            return Err(rows.wrong(
                 format_args!(
                     "the mask is of a frame of {} x {} pixels and a focal length of {focal_px}, but rig.toml has {} x {} and {}",
                     size[0], size[1], camera.width_px, camera.height_px, camera.focal_px
@@ -50,25 +48,22 @@ pub fn read_masks_csv(path: &Path, rig: &Rig) -> Result<Vec<MaskRow>, FileError>
                 "use masks of the same camera",
             ));
         }
-        let text = table.text(mask)?;
+        let text = rows.text(mask);
         let bytes = match text {
             "" => None,
             _ => Some(STANDARD.decode(text).map_err(|error| {
-                table.wrong(
+                rows.wrong(
                     format_args!("the mask is not base64 ({error})"),
                     "make the file again",
                 )
             })?),
         };
-        rows.push(MaskRow {
-            pose: Pose {
-                light: table.arm_direction(theta_i, phi_i)?,
-                view: table.arm_direction(theta_v, phi_v)?,
-            },
+        masks.push(MaskRow {
+            pose: rows.pose(angles)?,
             mask: bytes,
         });
     }
-    Ok(rows)
+    Ok(masks)
 }
 
 /// Writes masks whole.

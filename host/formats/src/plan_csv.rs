@@ -1,7 +1,7 @@
 //! `plan.csv`: the poses of a session in travelling order.
 
-use crate::csv_table::CsvTable;
 use crate::frames_csv::Degrees;
+use crate::named_table::NamedTable;
 use crate::{FileError, write_whole};
 use gonia_brdf::Pose;
 use std::io::Write;
@@ -14,27 +14,19 @@ use std::path::Path;
 /// One line naming the file and its line: a missing column, an index out of order, a number that
 /// is none, or a polar angle outside 0° ≤ θ < 90°.
 pub fn read_plan_csv(path: &Path) -> Result<Vec<Pose>, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let [index, theta_i, phi_i, theta_v, phi_v] = [
-        table.column("index")?,
-        table.column("theta_i_deg")?,
-        table.column("phi_i_deg")?,
-        table.column("theta_v_deg")?,
-        table.column("phi_v_deg")?,
-    ];
+    let table = NamedTable::open(path, &["index", "theta_i_deg"], 5)?;
+    let (index, angles) = (table.column("index")?, table.angles()?);
+    let mut rows = table.rows();
     let mut poses = Vec::new();
-    while table.next_row()? {
-        let found: usize = table.number(index)?;
+    while rows.advance()? {
+        let found: usize = rows.number(index)?;
         if found != poses.len() {
-            return Err(table.wrong(
+            return Err(rows.wrong(
                 format_args!("index {found} where {} is due", poses.len()),
                 "make the plan anew, or number its rows from 0",
             ));
         }
-        poses.push(Pose {
-            light: table.arm_direction(theta_i, phi_i)?,
-            view: table.arm_direction(theta_v, phi_v)?,
-        });
+        poses.push(rows.pose(angles)?);
     }
     Ok(poses)
 }
@@ -89,5 +81,99 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let error = read_plan_csv(&path).unwrap_err().to_string();
         assert!(error.contains("line 3: index 2 where 1 is due"), "{error}");
+    }
+
+    const PLAN: &str =
+        "index,theta_i_deg,phi_i_deg,theta_v_deg,phi_v_deg\n0,15.5,60.25,30,90\n1,45,0,60,180.5\n";
+
+    #[test]
+    fn every_dialect_gives_the_same_poses() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("plan.csv");
+        let poses = |bytes: &[u8]| -> Vec<[f64; 4]> {
+            std::fs::write(&path, bytes).unwrap();
+            let of = |Pose { light, view }: &Pose| {
+                let angles = [
+                    light.theta_deg(),
+                    light.phi_deg(),
+                    view.theta_deg(),
+                    view.phi_deg(),
+                ];
+                angles.map(|angle| (angle * 1e6).round() * 1e-6)
+            };
+            read_plan_csv(&path).unwrap().iter().map(of).collect()
+        };
+        let usual = poses(PLAN.as_bytes());
+        assert_eq!(usual.len(), 2);
+        let utf16: Vec<u8> = "\u{feff}"
+            .encode_utf16()
+            .chain(PLAN.encode_utf16())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let german = PLAN
+            .replace(',', ";")
+            .replace('.', ",")
+            .replace('\n', ";\r\n");
+        let radians = |deg: f64| deg.to_radians();
+        let in_radians = format!(
+            "index,theta_i_rad,phi_i_rad,theta_v_rad,phi_v_rad\n0,{},{},{},{}\n1,{},0,{},{}\n",
+            radians(15.5),
+            radians(60.25),
+            radians(30.0),
+            radians(90.0),
+            radians(45.0),
+            radians(60.0),
+            radians(180.5)
+        );
+        for bytes in [
+            utf16,
+            german.into_bytes(),
+            PLAN.replace(',', "\t").into_bytes(),
+            PLAN.replace(',', "  ").into_bytes(),
+            format!("sep=,\n{PLAN}").into_bytes(),
+            format!("Plan of Monday\n\n# {PLAN}").into_bytes(),
+            PLAN.replace("theta_i_deg", "Theta_In [\u{b0}]")
+                .replace("index", "Index")
+                .into_bytes(),
+            in_radians.into_bytes(),
+        ] {
+            assert_eq!(poses(&bytes), usual, "{}", String::from_utf8_lossy(&bytes));
+        }
+    }
+
+    #[test]
+    fn what_is_missing_twice_or_out_of_range_is_named_as_the_file_names_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("plan.csv");
+        for (text, said) in [
+            (
+                PLAN.replace("phi_v_deg", "phi"),
+                "line 1: there is no column \"phi_v_deg\"; found: index, theta_i_deg, phi_i_deg, theta_v_deg, phi;",
+            ),
+            (
+                PLAN.replace("phi_v_deg", "phi_in")
+                    .replace("phi_i_deg", "phi_i"),
+                "phi_i and phi_in are columns of the same quantity",
+            ),
+            (
+                PLAN.replace(',', ";").replace("15.5", "15,5"),
+                "line 2: phi_i_deg \"60.25\" has a decimal point",
+            ),
+            (
+                PLAN.replace("phi_v_deg\n", "phi_v_deg,phi_in\n")
+                    .replace("90\n", "90,1\n"),
+                "line 3: 5 fields where line 1 names 6",
+            ),
+            (
+                PLAN.replace("_deg", "_rad"),
+                "line 2: theta_i_rad 15.5 radians is not a polar angle",
+            ),
+            (String::new(), "the file has no header"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = read_plan_csv(&path).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+            assert_eq!(error.lines().count(), 1);
+        }
     }
 }

@@ -1,6 +1,7 @@
-//! Raw frames as a sensor gives them: counts, in a grey or RGB PNG or TIFF of 8 or 16 bits a channel.
+//! Raw frames as a sensor gives them: counts, in a grey or RGB PNG or TIFF of 8 or 16 bits a channel, or in a
+//! DNG.
 
-pub use crate::raw_file::RawFile;
+pub use crate::raw_file::{FileSensor, RawFile};
 
 use crate::raw_file::camera_raw;
 use crate::{FileError, raw_png, raw_tiff};
@@ -138,7 +139,7 @@ mod tests {
             ("", "is not a PNG or TIFF"),
             (
                 "II*\0\x10\0\0\0CR\x02\0",
-                "is a camera raw file (Canon CR2), which is not read; make a TIFF",
+                "is a camera raw file (Canon CR2), which is not read; convert it to DNG",
             ),
             ("\0\0\0\x18ftypcrx ", "Canon CR3"),
             ("v/1\x01\x02\0\0\0", "leave exposure_s empty"),

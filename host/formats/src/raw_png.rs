@@ -62,6 +62,7 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
         },
         bits: depth as u8,
         encoded,
+        sensor: None,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Raw exposures as TIFF: grey or RGB of 8 or 16 bits, one image a file.
 
 use crate::raw_file::{RawFile, wrong_size};
-use crate::{FileError, encoding};
+use crate::{FileError, dng, encoding};
 use gonia_rig::RawFrame;
 use std::fs::File;
 use std::io::BufReader;
@@ -38,6 +38,10 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
     };
     let file = File::open(path).map_err(|error| FileError::reading(path, &error))?;
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?;
+    let version = decoder.find_tag(Tag::Unknown(dng::VERSION));
+    if version.map_err(broken)?.is_some() {
+        return dng::read(path, width, height);
+    }
     let mut limits = Limits::default();
     // Three channels of two bytes, which is all that is ever asked of it.
     limits.decoding_buffer_size = 6 * width * height + ROOM;
@@ -51,7 +55,7 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
     {
         return Err(crate::raw_file::camera_raw(
             path,
-            "camera raw file (DNG or alike)",
+            "camera raw file (NEF, ARW or alike)",
         ));
     }
     let (w, h) = decoder.dimensions().map_err(broken)?;
@@ -107,6 +111,7 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
         },
         bits,
         encoded: profile.and_then(|profile| encoding::of_profile(&profile)),
+        sensor: None,
     })
 }
 

@@ -1,9 +1,8 @@
-//! The table of a reference's reflectance: a CSV with r, g, b by theta_i, or by theta_i, phi_i,
-//! theta_v, phi_v (degrees).
+//! The table of a reference's reflectance: a CSV with r, g, b (or one value, reflectance) by theta_i, or
+//! by theta_i, phi_i, theta_v, phi_v (degrees).
 
 use crate::FileError;
-use crate::csv_table::CsvTable;
-use gonia_brdf::Pose;
+use crate::named_table::{NamedRows, NamedTable};
 use gonia_rig::ReflectanceTable;
 use std::path::Path;
 
@@ -16,8 +15,8 @@ const MOST: f64 = 10.0;
 /// One line naming the file and its line: a missing column, no rows, a polar angle outside
 /// 0° ≤ θ < 90°, one given twice, or a reflectance that is not above 0 and at most 10.
 pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
-    let mut table = CsvTable::open(path)?;
-    let theta_i = table.column("theta_i")?;
+    let table = NamedTable::open(path, &["theta_i"], 2)?;
+    let theta_i = table.angle("theta_i")?;
     let others = ["phi_i", "theta_v", "phi_v"];
     let by_pose = others
         .iter()
@@ -25,8 +24,11 @@ pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
         .collect::<Result<Vec<_>, _>>()?
         .iter()
         .any(Option::is_some);
-    let [r, g, b] = [table.column("r")?, table.column("g")?, table.column("b")?];
-    let rho = |table: &CsvTable| {
+    let [r, g, b] = match table.optional_column("reflectance")? {
+        Some(grey) => [grey; 3],
+        None => [table.column("r")?, table.column("g")?, table.column("b")?],
+    };
+    let rho = |table: &mut NamedRows<'_>| {
         let rho: [f64; 3] = [table.number(r)?, table.number(g)?, table.number(b)?];
         match rho.iter().find(|rho| !(**rho > 0.0 && **rho <= MOST)) {
             None => Ok(rho),
@@ -37,37 +39,31 @@ pub fn read_reflectance(path: &Path) -> Result<ReflectanceTable, FileError> {
         }
     };
     if by_pose {
-        let [phi_i, theta_v, phi_v] = [
-            table.column(others[0])?,
-            table.column(others[1])?,
-            table.column(others[2])?,
-        ];
+        let angles = table.angles()?;
         let mut rows = Vec::new();
-        while table.next_row()? {
-            let pose = Pose {
-                light: table.arm_direction(theta_i, phi_i)?,
-                view: table.arm_direction(theta_v, phi_v)?,
-            };
-            rows.push((pose, rho(&table)?));
+        let mut lines = table.rows();
+        while lines.advance()? {
+            rows.push((lines.pose(angles)?, rho(&mut lines)?));
         }
         return some(path, rows.is_empty(), ReflectanceTable::ByPose(rows));
     }
     let mut rows: Vec<(f64, [f64; 3])> = Vec::new();
-    while table.next_row()? {
-        let theta: f64 = table.number(theta_i)?;
+    let mut lines = table.rows();
+    while lines.advance()? {
+        let (_, theta) = lines.angle(theta_i)?;
         if !(0.0..90.0).contains(&theta) {
-            return Err(table.wrong(
+            return Err(lines.wrong(
                 format_args!("theta_i {theta} is not a polar angle"),
                 "give degrees from the normal, from 0 to below 90",
             ));
         }
         if rows.iter().any(|row| row.0 == theta) {
-            return Err(table.wrong(
+            return Err(lines.wrong(
                 format_args!("theta_i {theta} is there twice"),
                 "give each polar angle once",
             ));
         }
-        rows.push((theta, rho(&table)?));
+        rows.push((theta, rho(&mut lines)?));
     }
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     some(path, rows.is_empty(), ReflectanceTable::ByIncidence(rows))
@@ -96,6 +92,8 @@ mod tests {
         let table = read("theta_i,r,g,b\n60,.9,.9,.9\n8,.99,.98,.97\n").unwrap();
         let expected = vec![(8.0, [0.99, 0.98, 0.97]), (60.0, [0.9; 3])];
         assert_eq!(table, ReflectanceTable::ByIncidence(expected));
+        let grey = read("Theta_i [deg];Reflectance\n60;0,9\n").unwrap();
+        assert_eq!(grey, ReflectanceTable::ByIncidence(vec![(60.0, [0.9; 3])]));
         let table = read("theta_i,phi_i,theta_v,phi_v,r,g,b\n45,0,0,0,1.01,1,1\n").unwrap();
         assert!(matches!(table, ReflectanceTable::ByPose(rows) if rows.len() == 1));
     }
@@ -117,6 +115,6 @@ mod tests {
         let error = read("theta_i,theta_v,r,g,b\n1,2,1,1,1\n")
             .unwrap_err()
             .to_string();
-        assert!(error.contains("no column \"phi_i\""), "{error}");
+        assert!(error.contains("no column \"phi_i_deg\""), "{error}");
     }
 }

@@ -108,6 +108,7 @@ pub(super) fn add_to(read: &mut SamplesRead, samples: &Path) -> Result<(), FileE
         ));
         return Ok(());
     }
+    read.provenance = note.provenance;
     match note.scale {
         Some(scale) => agree(&mut read.scale, scale, samples),
         None => Ok(()),

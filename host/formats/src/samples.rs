@@ -101,12 +101,21 @@ pub fn read_samples_of_all(
     let mut all = SamplesRead::default();
     let mut scales = Vec::with_capacity(paths.len());
     let mut next = 0u32;
-    for path in paths {
+    for (number, path) in (1..).zip(paths) {
         let SamplesRead {
             mut samples,
             scale,
+            provenance,
             mut remarks,
         } = read_samples(path)?;
+        let of = if paths.len() == 1 {
+            String::from("samples")
+        } else {
+            format!("samples.{number}")
+        };
+        let named = provenance.into_iter();
+        all.provenance
+            .extend(named.map(|(name, fact)| (format!("{of}.{name}"), fact)));
         all.remarks.append(&mut remarks);
         scales.push((path.as_path(), scale));
         let mut last = None;

@@ -14,13 +14,16 @@ const FIRST_BYTES: u64 = 1 << 16;
 /// When the file cannot be read, or holds something else than text.
 pub(super) fn read_text(path: &Path) -> Result<String, FileError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
-    decoded(bytes).ok_or_else(|| {
-        FileError::new(
-            path,
-            "is not text",
-            "give a table as CSV, in UTF-8, UTF-16 or Latin-1",
-        )
-    })
+    decoded(bytes).ok_or_else(|| not_text(path))
+}
+
+/// What is said of bytes that [`decoded`] does not take for text.
+pub(super) fn not_text(path: &Path) -> FileError {
+    FileError::new(
+        path,
+        "is not text",
+        "give a table as CSV, in UTF-8, UTF-16 or Latin-1",
+    )
 }
 
 /// The first lines of an ordinary file; `None` where it is none, or no text.
@@ -35,7 +38,7 @@ pub(super) fn read_first_lines(path: &Path) -> Option<String> {
 }
 
 /// The text of these bytes; `None` where they are no text.
-fn decoded(bytes: Vec<u8>) -> Option<String> {
+pub(super) fn decoded(bytes: Vec<u8>) -> Option<String> {
     let text = match bytes[..] {
         [0xef, 0xbb, 0xbf, ..] => of_one_byte_a_letter(bytes[3..].to_vec()),
         [0xff, 0xfe, ref rest @ ..] => of_two_bytes(rest, u16::from_le_bytes)?,

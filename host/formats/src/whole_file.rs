@@ -94,6 +94,17 @@ pub fn check_output(file: &Path, inputs: &[&Path]) -> Result<(), FileError> {
     Ok(())
 }
 
+/// Whether two names are those of one file, which need not be there yet.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = folder_of(path).canonicalize().ok();
+        path.canonicalize()
+            .ok()
+            .or_else(|| Some(folder?.join(path.file_name()?)))
+    };
+    a == b || place(a).is_some_and(|place_of_a| Some(place_of_a) == place(b))
+}
+
 /// Whether a file may stand under this name: an ordinary one, or none yet.
 fn check_name(file: &Path) -> Result<(), FileError> {
     let is_folder = || FileError::new(file, "is a folder", "give the name of a file in it");

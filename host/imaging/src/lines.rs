@@ -3,6 +3,8 @@
 use crate::luminance;
 use gonia_brdf::Elementary;
 use gonia_rig::{CameraModel, Frame, Homography, Target};
+use std::f64::consts::SQRT_2;
+use std::ops::Range;
 
 /// The lines x = −a, x = +a, y = −a, y = +a, in this order everywhere.
 pub const SIDES: [Side; 4] = [
@@ -22,8 +24,13 @@ pub const SIDES: [Side; 4] = [
 const MAX_STATIONS: f64 = 256.0;
 /// Pixels kept beyond the search range and the line itself, for the fit's own window.
 const WINDOW_PX: f64 = 4.0;
+/// Pixels beside a pixel that its gradient needs.
+const SOBEL_PX: f64 = 1.0;
 /// Distance from the ends of a line (the crossings) at which stations begin, pixels.
 const CLEAR_OF_CROSSING_PX: f64 = 4.0;
+
+/// Places on a line at which its row is looked up, less one.
+const PLACES_A_LINE: usize = 8;
 
 /// Which of the four lines: the coordinate that is constant on it, and its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +83,43 @@ pub struct RunSample {
     pub pixel: [u16; 2],
 }
 
+/// How far from a line its strip reaches, when `step` is a millimetre outwards at its middle, pixels.
+fn reach_px(target: &Target, step: [f64; 2], search_px: f64) -> f64 {
+    // Perspective makes the near end of a line up to half as wide again as its middle.
+    let half_line = 0.75 * target.line_width_mm * step[0].hypotenuse(step[1]);
+    search_px + half_line + WINDOW_PX
+}
+
+/// The rows of a frame that strips `search_px` to either side of the four lines may look at: the strips
+/// themselves and all between them.
+pub fn rows_of_strips(
+    camera: &CameraModel,
+    target_to_px: &Homography,
+    target: &Target,
+    search_px: f64,
+) -> Range<usize> {
+    let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
+    for side in SIDES {
+        let [from, to] = side.ends_mm(target.line_offset_mm);
+        let step = target_to_px.jacobian([0, 1].map(|i| 0.5 * (from[i] + to[i])))[side.axis];
+        // Runs are cut along rows or columns, at most 45 degrees from the line's normal.
+        let margin = SQRT_2 * reach_px(target, step, search_px) + SOBEL_PX + 2.0;
+        for k in 0..=PLACES_A_LINE {
+            // A lens bends the line between its ends.
+            let share = k as f64 / PLACES_A_LINE as f64;
+            let at = [0, 1].map(|i| from[i] + share * (to[i] - from[i]));
+            let row = camera.distort(target_to_px.apply(at))[1];
+            if !(row.is_finite() && margin.is_finite()) {
+                return 0..camera.size_px[1];
+            }
+            top = top.min(row - margin);
+            bottom = bottom.max(row + margin);
+        }
+    }
+    let row = |y: f64| (y.max(0.0) as usize).min(camera.size_px[1]);
+    row(top)..row(bottom.ceil())
+}
+
 impl LineStrip {
     /// Cuts the strip around one line out of a frame, `search_px` to either side. Empty when the
     /// line is outside the frame or seen edge-on.
@@ -119,9 +163,7 @@ impl LineStrip {
                 let d = target_to_px.jacobian(mm)[side.axis];
                 (d[0] * outward[0] + d[1] * outward[1]).abs()
             };
-            // Perspective makes the near end of a line up to half as wide again as its middle.
-            let half_line = 0.75 * target.line_width_mm * step[0].hypotenuse(step[1]);
-            let reach_px = search_px + half_line + WINDOW_PX;
+            let reach_px = reach_px(target, step, search_px);
             strip.fill(frame, camera, reach_px, reach, across);
         }
         strip

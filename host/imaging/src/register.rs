@@ -6,13 +6,14 @@
 //! the move is the estimate of the arms' error.
 
 use crate::hough::{StripLine, strongest_line};
-use crate::lines::{LineStrip, SIDES};
+use crate::lines::{LineStrip, SIDES, rows_of_strips};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
 use crate::turn::Turn;
 use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// Prior standard deviations of θ and φ (the arms' 0.03°), roll, image shift (in frame widths) and
 /// ln magnification.
@@ -183,22 +184,7 @@ impl Registrar {
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
         match self.locate(frame, reading.view, &predicted) {
-            Ok(solution) => Registration {
-                view: self
-                    .camera
-                    .placement(reading.view, solution.shift)
-                    .direction(),
-                pose_offset: PoseOffset {
-                    theta_deg: solution.shift.theta.to_degrees(),
-                    phi_deg: solution.shift.phi.to_degrees(),
-                },
-                pixel_from_target: solution.homography,
-                residual_px: solution.scatter_px,
-                blur_px: solution.blur_px,
-                lines_found: solution.lines_found,
-                state: RegistrationState::Locked,
-                camera: self.camera.clone(),
-            },
+            Ok((solution, _)) => self.locked(reading, solution),
             Err(failure) => {
                 let reason = self.explain(frame, reading.view, &predicted, failure.reason);
                 Registration {
@@ -218,17 +204,71 @@ impl Registrar {
         }
     }
 
+    /// Registers a frame of which only the rows `read` are there, usually [`Registrar::rows`]. None when the
+    /// fiducial lines are not where the pose puts them, or the search for them left these rows: then the
+    /// whole frame is needed, and [`Registrar::register`] would give the same otherwise.
+    pub fn register_rows(
+        &self,
+        frame: &Frame,
+        reading: Pose,
+        read: &Range<usize>,
+    ) -> Option<Registration> {
+        let covers = |map: &Homography| {
+            let needed = self.rows_about(map);
+            read.start <= needed.start && needed.end <= read.end
+        };
+        let predicted = self.camera.predict(reading.view, CameraShift::default());
+        if !covers(&predicted) {
+            return None;
+        }
+        let (solution, about) = self.locate(frame, reading.view, &predicted).ok()?;
+        // Lines far from their prediction were measured again about a better one.
+        covers(&about).then(|| self.locked(reading, solution))
+    }
+
+    /// The rows of a frame taken at a view that show the target, if it is about where the pose puts it,
+    /// and all that the search for its lines there looks at.
+    pub fn rows(&self, view: Direction) -> Range<usize> {
+        self.rows_about(&self.camera.predict(view, CameraShift::default()))
+    }
+
+    fn rows_about(&self, pixel_from_target: &Homography) -> Range<usize> {
+        let search_px = SEARCH_WIDTHS * self.camera.size_px[0] as f64 + 4.0;
+        rows_of_strips(&self.camera, pixel_from_target, &self.target, search_px)
+    }
+
+    fn locked(&self, reading: Pose, solution: Solution) -> Registration {
+        Registration {
+            view: self
+                .camera
+                .placement(reading.view, solution.shift)
+                .direction(),
+            pose_offset: PoseOffset {
+                theta_deg: solution.shift.theta.to_degrees(),
+                phi_deg: solution.shift.phi.to_degrees(),
+            },
+            pixel_from_target: solution.homography,
+            residual_px: solution.scatter_px,
+            blur_px: solution.blur_px,
+            lines_found: solution.lines_found,
+            state: RegistrationState::Locked,
+            camera: self.camera.clone(),
+        }
+    }
+
+    /// Where the lines are, and the map about which they were looked for at last.
     fn locate(
         &self,
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
-    ) -> Result<Solution, Failure> {
+    ) -> Result<(Solution, Homography), Failure> {
         let solution = self.solve(frame, view, predicted)?;
         if solution.furthest_px > RELINEARIZE_PX {
-            return self.solve(frame, view, &solution.homography);
+            let about = solution.homography;
+            return Ok((self.solve(frame, view, &about)?, about));
         }
-        Ok(solution)
+        Ok((solution, predicted.clone()))
     }
 
     /// A failure, or what is behind it where the whole target is elsewhere.

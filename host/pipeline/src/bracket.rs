@@ -1,5 +1,6 @@
 //! A frame from the raw exposures of its bracket: read, checked, merged.
 
+use crate::bracket_sensor;
 use gonia_formats::raw_frame::{RawFile, read_raw};
 use gonia_formats::{CaptureFolder, FileError};
 use gonia_imaging::hdr::{LINEARITY_LIMIT, Linearity, Radiance, merge_bracket, mosaic_doubt};
@@ -24,7 +25,7 @@ pub struct Bracket {
 /// # Errors
 /// One line naming the file: an exposure that cannot be read or is not of the rig's camera, or says
 /// itself that its counts are not linear while no other exposure shows that they are; exposures of
-/// several kinds; no `[sensor]` in `rig.toml`, or one that the counts contradict (a mosaic without its
+/// several kinds; no `[sensor]` in `rig.toml` where the file does not say it itself, or one that the counts contradict (a mosaic without its
 /// pattern or with another, a saturation that they cannot reach); or exposures that disagree by more
 /// than 5 %.
 pub fn load_bracket(folder: &CaptureFolder, row: &FrameRow) -> Result<Bracket, FileError> {
@@ -42,19 +43,17 @@ pub fn load_bracket(folder: &CaptureFolder, row: &FrameRow) -> Result<Bracket, F
 /// As [`load_bracket`].
 pub fn merge_files(rig: &Rig, files: &[(f64, PathBuf)]) -> Result<Bracket, FileError> {
     let first = files.first().map_or(Path::new(""), |(_, path)| path);
-    let Some(sensor) = &rig.sensor else {
-        return Err(FileError::new(
-            first,
-            "is a raw exposure, but rig.toml has no [sensor]",
-            "give black_counts, saturation_counts, gain_e_per_count and read_noise_e there",
-        ));
-    };
     let camera = &rig.camera;
+    let mut sensor = None;
+    let mut remarks = Vec::new();
     let mut exposures: Vec<(f64, RawFrame)> = Vec::new();
     let mut encoded = None;
     for (exposure_s, path) in files {
         let file = read_raw(path, camera.width_px, camera.height_px)?;
-        check_sensor(path, &file, sensor)?;
+        let of_file = bracket_sensor::of_file(path, rig.sensor.as_ref(), &file)?;
+        remarks.extend(bracket_sensor::exposure_remark(path, *exposure_s, &file));
+        check_sensor(path, &file, &of_file)?;
+        sensor.get_or_insert(of_file);
         if let Some((_, other)) = exposures.first()
             && other.channels != file.raw.channels
         {
@@ -72,8 +71,11 @@ pub fn merge_files(rig: &Rig, files: &[(f64, PathBuf)]) -> Result<Bracket, FileE
         encoded = encoded.or(file.encoded.map(|how| (path, how)));
         exposures.push((*exposure_s, file.raw));
     }
-    let radiance = merge_checked(&exposures, sensor, first)?;
-    let mut remarks = Vec::new();
+    let Some(sensor) = sensor else {
+        let remedy = "give one at least";
+        return Err(FileError::new(first, "a frame without exposures", remedy));
+    };
+    let radiance = merge_checked(&exposures, &sensor, first)?;
     if let Some((path, how)) = encoded {
         let proof = radiance.linearity.filter(tells);
         let Some(proof) = proof else {

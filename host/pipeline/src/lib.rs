@@ -26,6 +26,7 @@
 mod accumulate;
 pub mod baselines;
 pub mod bracket;
+mod bracket_sensor;
 pub mod chart;
 pub mod compare;
 mod doubts;

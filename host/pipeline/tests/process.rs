@@ -388,6 +388,63 @@ fn samples_do_not_depend_on_the_number_of_threads_and_progress_counts_to_the_end
     assert_eq!(run(1), run(3));
 }
 
+/// Gives only the rows that are asked for, and counts them and the frames of which all are wanted.
+struct ByRows<'a> {
+    rendered: &'a Rendered,
+    given: AtomicUsize,
+    whole: AtomicUsize,
+}
+
+impl FrameSource for ByRows<'_> {
+    fn rows(&self) -> &[FrameRow] {
+        self.rendered.rows()
+    }
+
+    fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
+        self.whole.fetch_add(1, Ordering::Relaxed);
+        self.rendered.load(row)
+    }
+
+    fn load_rows(
+        &self,
+        row: &FrameRow,
+        rows: std::ops::Range<usize>,
+    ) -> Result<Option<Frame>, FileError> {
+        self.given.fetch_add(rows.len(), Ordering::Relaxed);
+        let mut frame = self.rendered.load(row)?;
+        for (k, line) in frame.rgb.chunks_mut(frame.width).enumerate() {
+            if !rows.contains(&k) {
+                line.fill([f32::NAN; 3]);
+            }
+        }
+        Ok(Some(frame))
+    }
+}
+
+#[test]
+fn rows_that_show_the_target_give_the_samples_of_the_whole_frames() {
+    let (mut source, rig) = lambertian(300);
+    // A light's head in the way, and a frame that does not show the target.
+    source.add(Role::Reference, [75.0, 165.0, 75.0, 345.0]);
+    source.add(Role::Material, [75.0, 165.0, 75.0, 345.0]);
+    source.add(Role::Material, BLIND);
+    let going = |_, _| ControlFlow::Continue(());
+    let whole = process(&rig, &source, &Masks::default(), &going).unwrap();
+    let by_rows = ByRows {
+        rendered: &source,
+        given: AtomicUsize::new(0),
+        whole: AtomicUsize::new(0),
+    };
+    let some = process(&rig, &by_rows, &Masks::default(), &going).unwrap();
+    assert_eq!(some.samples, whole.samples);
+    assert_eq!(some.frames, whole.frames);
+    assert!(whole.samples.len() > 5000, "{}", whole.samples.len());
+    // Only the blank wall was looked at as a whole.
+    assert_eq!(by_rows.whole.into_inner(), 1);
+    let share = by_rows.given.into_inner() as f64 / (300 * source.rows.len()) as f64;
+    assert!(share < 0.75, "{share}");
+}
+
 #[test]
 fn masks_of_a_references_frames_serve_a_material_without_them() {
     let mut scene = Scene::of_fabric(400);

@@ -96,16 +96,17 @@ impl Figures {
         text
     }
 
-    /// The table as CSV, one row a stratum.
+    /// The table as CSV, one row a stratum; each with the factor that was taken out, where there is one.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(
-            "stratum,cells,log_rms,log_mean,cos_error_mean,cos_error_p99,delta_e,reciprocity_a,reciprocity_b\n",
+            "stratum,cells,log_rms,log_mean,cos_error_mean,cos_error_p99,delta_e,reciprocity_a,reciprocity_b,factor\n",
         );
         let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+        let factor = optional(self.factor);
         for row in &self.strata {
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{factor}",
                 row.stratum,
                 row.cells,
                 row.log_rms,
@@ -121,7 +122,7 @@ impl Figures {
             ("sphere", self.sphere_delta_e),
             ("cylinder", self.cylinder_delta_e),
         ] {
-            let _ = writeln!(text, "{name},,,,,,{value},,");
+            let _ = writeln!(text, "{name},,,,,,{value},,,{factor}");
         }
         text
     }

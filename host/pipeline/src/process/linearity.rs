@@ -47,7 +47,7 @@ pub fn doubt(
             100.0 * range,
             100.0 * offset * brightest
         ),
-        "check black_counts in rig.toml, stray light, and that values are linear",
+        "check black_counts in rig.toml, stray light, that values are linear, and that the reference reflects alike under all lights (else give its table)",
     ))
 }
 

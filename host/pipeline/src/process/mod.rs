@@ -130,6 +130,9 @@ pub enum ProcessError {
     Cancelled(#[from] Cancelled),
 }
 
+/// Rows of a frame that show the target, as a share of all, up to which only they are read: with more, little
+/// is left out, and a frame that does not show it there is read twice.
+const WORTHWHILE: f64 = 0.9;
 /// Frames in work at a time; what they leave is gathered in their order.
 const BATCH: usize = 256;
 
@@ -153,14 +156,19 @@ pub fn process(
 ) -> Result<Processed, ProcessError> {
     let sampler = FrameSampler::new(rig);
     let heard = HeardRemarks::default();
-    let sampled = |row: &FrameRow, hidden: Hidden| match load(rig, source, row) {
-        Ok((frame, remarks)) => {
-            heard.of_frame(row, remarks);
-            Ok(sampler.sample(&frame, row, hidden))
+    let sampled = |row: &FrameRow, hidden: Hidden| {
+        if let Some(sampled) = sample_rows(rig, source, &sampler, row, hidden) {
+            return Ok(sampled);
         }
-        Err(error) => {
-            heard.unusable(row, error);
-            Ok(SampledFrame::refused(row, Refusal::Unusable))
+        match load(rig, source, row) {
+            Ok((frame, remarks)) => {
+                heard.of_frame(row, remarks);
+                Ok(sampler.sample(&frame, row, hidden))
+            }
+            Err(error) => {
+                heard.unusable(row, error);
+                Ok(SampledFrame::refused(row, Refusal::Unusable))
+            }
         }
     };
     let processed = process_sampled(rig, source.rows(), &sampled, masks, progress);
@@ -250,6 +258,23 @@ pub fn process_sampled(
             .collect(),
         masks: calibrator.into_masks(),
     })
+}
+
+/// Samples a frame by the rows that show the target, where that is all there is to it: it is where its pose
+/// puts it, and reading these rows is cheaper than reading all.
+fn sample_rows(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    sampler: &FrameSampler,
+    row: &FrameRow,
+    hidden: Hidden,
+) -> Option<SampledFrame> {
+    let rows = sampler.rows(row);
+    if rows.len() as f64 > WORTHWHILE * rig.camera.height_px as f64 {
+        return None;
+    }
+    let frame = source.load_rows(row, rows.clone()).ok()??;
+    sampler.sample_rows(&frame, row, hidden, &rows)
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.

@@ -7,6 +7,7 @@ use gonia_imaging::{
     LeftOut, Mask, PoseOffset, Registrar, Registration, SamplingGrid, find_occlusion,
 };
 use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Placement, Rig};
+use std::ops::Range;
 
 /// What one grid point shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,10 +102,39 @@ impl FrameSampler {
         hidden: Hidden,
     ) -> (SampledFrame, Registration) {
         let registration = self.registrar.register(frame, row.pose);
+        let sampled = self.sample_at(frame, row, hidden, &registration);
+        (sampled, registration)
+    }
+
+    /// The rows of a frame that [`FrameSampler::sample_rows`] needs.
+    pub fn rows(&self, row: &FrameRow) -> Range<usize> {
+        self.registrar.rows(row.pose.view)
+    }
+
+    /// As [`FrameSampler::sample`], of a frame of which only the rows `read` are there. None when that does
+    /// not show the target where its pose puts it: what it shows instead, the whole frame tells.
+    pub fn sample_rows(
+        &self,
+        frame: &Frame,
+        row: &FrameRow,
+        hidden: Hidden,
+        read: &Range<usize>,
+    ) -> Option<SampledFrame> {
+        let registration = self.registrar.register_rows(frame, row.pose, read)?;
+        Some(self.sample_at(frame, row, hidden, &registration))
+    }
+
+    fn sample_at(
+        &self,
+        frame: &Frame,
+        row: &FrameRow,
+        hidden: Hidden,
+        registration: &Registration,
+    ) -> SampledFrame {
         let report = FrameReport {
             frame: row.frame,
             role: row.role,
-            outcome: Outcome::of(&registration),
+            outcome: Outcome::of(registration),
             residual_px: registration.residual_px,
             pose_offset: registration.pose_offset,
         };
@@ -116,16 +146,16 @@ impl FrameSampler {
             mask: None,
         };
         if let Outcome::Refused(_) = report.outcome {
-            return (sampled, registration);
+            return sampled;
         }
         let mask = match hidden {
             Hidden::Find => {
-                sampled.mask = find_occlusion(frame, &registration, row.pose.light, &self.rig);
+                sampled.mask = find_occlusion(frame, registration, row.pose.light, &self.rig);
                 sampled.mask.as_ref()
             }
             Hidden::Known(mask) => mask,
         };
-        let points = self.grid.sample(frame, &registration, mask).into_iter();
+        let points = self.grid.sample(frame, registration, mask).into_iter();
         sampled.points = points
             .map(|point| {
                 point.map(|value| SampledPoint {
@@ -134,6 +164,6 @@ impl FrameSampler {
                 })
             })
             .collect();
-        (sampled, registration)
+        sampled
     }
 }

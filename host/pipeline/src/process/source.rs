@@ -3,6 +3,7 @@
 use crate::bracket::{Bracket, load_bracket};
 use gonia_formats::{CaptureFolder, FileError};
 use gonia_rig::{Frame, Remark};
+use std::ops::Range;
 
 pub use gonia_rig::{FrameRow, Role};
 
@@ -21,6 +22,15 @@ pub trait FrameSource: Sync {
     fn load_with_remarks(&self, row: &FrameRow) -> Result<(Frame, Vec<Remark>), FileError> {
         Ok((self.load(row)?, Vec::new()))
     }
+
+    /// As [`FrameSource::load`], of a frame of which only some rows are needed: the others may be NaN.
+    /// None where reading some rows takes as long as reading all.
+    ///
+    /// # Errors
+    /// As [`FrameSource::load`], as far as these rows show it.
+    fn load_rows(&self, _row: &FrameRow, _rows: Range<usize>) -> Result<Option<Frame>, FileError> {
+        Ok(None)
+    }
 }
 
 impl FrameSource for CaptureFolder {
@@ -38,5 +48,12 @@ impl FrameSource for CaptureFolder {
         }
         let Bracket { radiance, remarks } = load_bracket(self, row)?;
         Ok((radiance.frame, remarks))
+    }
+
+    fn load_rows(&self, row: &FrameRow, rows: Range<usize>) -> Result<Option<Frame>, FileError> {
+        if self.exposures(row).is_empty() {
+            return self.load_rows(row, rows).map(Some);
+        }
+        Ok(None)
     }
 }
