@@ -26,6 +26,7 @@ mod frame;
 mod frame_row;
 mod genicam;
 mod homography;
+mod number;
 mod raw_frame;
 mod remark;
 mod rig;
