@@ -450,6 +450,20 @@ impl Registrar {
             roll_deg: LOOSE_ROLL_DEG,
             ..self.trust(ARM_DEG)
         };
+        let found = self.elsewhere(frame, view, predicted, within_widths, &trust)?;
+        Some(found.estimate.shift)
+    }
+
+    /// The four lines within so many frame widths of their predictions, where a camera within `trust` sees
+    /// them.
+    fn elsewhere(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+        trust: &Trust,
+    ) -> Option<Elsewhere> {
         let width = frame.width as f64;
         let search_px = within_widths * width + 4.0;
         let strips = self.strips(frame, predicted, search_px);
@@ -467,18 +481,17 @@ impl Registrar {
             if some.iter().flatten().count() < MIN_LINES {
                 return None;
             }
-            let guess = self.estimate(view, &strips, &some, &trust).shift;
-            let moved = CameraShift {
-                shift_px: guess.shift_px,
-                roll: guess.roll,
-                ..CameraShift::default()
-            };
-            let there = self.camera.predict(view, moved);
+            let guess = self.estimate(view, &strips, &some, trust).shift;
+            let there = self.camera.predict(view, guess);
             let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
-            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
-            let estimate = self.estimate(view, &strips, &lines, &trust);
-            let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
-            fits.then_some(estimate.shift)
+            let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+            let estimate = self.estimate(view, &strips, &fit.lines, trust);
+            let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(Elsewhere {
+                strips,
+                fit,
+                estimate,
+            })
         })
     }
 
@@ -489,6 +502,7 @@ impl Registrar {
             roll_deg: ROLL_DEG,
             shift_widths: SHIFT_WIDTHS,
             model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
+            ln_scale: LN_SCALE,
         }
     }
 
@@ -590,7 +604,7 @@ impl Registrar {
             trust.roll_deg.to_radians(),
             shift,
             shift,
-            LN_SCALE,
+            trust.ln_scale,
         ]
     }
 
@@ -630,6 +644,13 @@ impl Registrar {
         }
         Homography::from_corners(&corners, &seen)
     }
+}
+
+/// Four lines that are not where they were predicted.
+struct Elsewhere {
+    strips: [LineStrip; 4],
+    fit: LineFit,
+    estimate: Estimate,
 }
 
 struct Solution {
@@ -683,6 +704,8 @@ struct Trust {
     shift_widths: f64,
     /// Standard deviation of the model's lines, pixels.
     model_px: f64,
+    /// Standard deviation of the logarithm of the magnification.
+    ln_scale: f64,
 }
 
 impl Estimate {
@@ -737,5 +760,8 @@ fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
     0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
 }
 
+mod line_points;
 #[cfg(test)]
 mod photographs;
+
+pub use line_points::{LinePoint, Search};

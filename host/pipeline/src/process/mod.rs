@@ -10,7 +10,7 @@ pub mod coverage;
 mod linearity;
 pub mod masks;
 mod reference;
-mod reflectance;
+pub(crate) mod reflectance;
 mod remarks;
 pub mod sampled;
 pub mod source;
@@ -253,7 +253,7 @@ pub fn process_sampled(
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.
-fn load(
+pub(crate) fn load(
     rig: &Rig,
     source: &dyn FrameSource,
     row: &FrameRow,
