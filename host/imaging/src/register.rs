@@ -469,6 +469,20 @@ impl Registrar {
             ln_scale: LOOSE_LN_SCALE,
             ..self.trust(arm_deg)
         });
+        let found = self.elsewhere(frame, view, predicted, within_widths, &trusts)?;
+        Some(found.estimate.shift)
+    }
+
+    /// The four lines within so many frame widths of their predictions, where a camera within one of
+    /// `trusts` sees them: the first one's before the next one's.
+    fn elsewhere(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+        trusts: &[Trust],
+    ) -> Option<Elsewhere> {
         let width = frame.width as f64;
         let search_px = within_widths * width + 4.0;
         let strips = self.strips(frame, predicted, search_px);
@@ -493,10 +507,14 @@ impl Registrar {
             let guess = self.estimate(view, &strips, some, trust).shift;
             let there = self.camera.predict(view, guess);
             let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
-            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
-            let estimate = self.estimate(view, &strips, &lines, trust);
-            let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
-            fits.then_some(estimate.shift)
+            let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+            let estimate = self.estimate(view, &strips, &fit.lines, trust);
+            let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(Elsewhere {
+                strips,
+                fit,
+                estimate,
+            })
         })
     }
 
@@ -651,6 +669,13 @@ impl Registrar {
     }
 }
 
+/// Four lines that are not where they were predicted.
+struct Elsewhere {
+    strips: [LineStrip; 4],
+    fit: LineFit,
+    estimate: Estimate,
+}
+
 struct Solution {
     homography: Homography,
     shift: CameraShift,
@@ -758,5 +783,8 @@ fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
     0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
 }
 
+mod line_points;
 #[cfg(test)]
 mod photographs;
+
+pub use line_points::{LinePoint, Search};

@@ -11,7 +11,7 @@ mod light_check;
 mod linearity;
 pub mod masks;
 mod reference;
-mod reflectance;
+pub(crate) mod reflectance;
 mod remarks;
 pub(crate) mod rig_check;
 pub mod sampled;
@@ -268,7 +268,7 @@ pub fn process_sampled(
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.
-fn load(
+pub(crate) fn load(
     rig: &Rig,
     source: &dyn FrameSource,
     row: &FrameRow,
