@@ -5,6 +5,7 @@
 //! little, is the prior: what a grazing or half-hidden line leaves open is filled in from it, and
 //! the move is the estimate of the arms' error.
 
+mod line_points;
 mod prior;
 
 use crate::hough::{StripLine, strongest_line};
@@ -783,7 +784,6 @@ fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
     0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
 }
 
-mod line_points;
 #[cfg(test)]
 mod photographs;
 

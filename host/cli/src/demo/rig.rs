@@ -1,19 +1,20 @@
-//! The simulated rig: its drawing, how it was built, and what its own frames tell of that.
+//! The simulated rig: its drawing, how it was built, and how far directions are off by either.
 
 use gonia_acquire::camera::SimulatedFrames;
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::quantile::quantile;
 use gonia_brdf::{Brdf, Pose};
-use gonia_formats::FileError;
 use gonia_imaging::SamplingGrid;
-use gonia_pipeline::process::{FrameReport, FrameSource, Outcome};
-use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Placement, Rig, Role};
+use gonia_pipeline::process::{FrameReport, Outcome};
+use gonia_rig::{CameraModel, CameraShift, FrameRow, Placement, Reference, Rig};
 use gonia_sim::scene::{Scene, SceneGeometry, as_built};
 use std::sync::Arc;
 
-/// Frames of the reference from which the rig is calibrated: more add less than the arms' own error.
-const CALIBRATION_FRAMES: usize = 150;
+/// Poses at which the rig is calibrated: more add less than the arms' own error.
+const CALIBRATION_POSES: usize = 150;
+/// Reflectance of the matt tile that lies on the target then.
+const TILE: [f64; 3] = [0.97, 0.97, 0.96];
 /// Every so manieth point of the grid is a place where directions are compared.
 const POINT_STEP: usize = 40;
 
@@ -63,6 +64,27 @@ impl DemoRig {
             }
             false => Scene::as_built(&self.nominal, material, reference, seed),
         }
+    }
+
+    /// What a lab knows when it calibrates: the drawing, and its tile.
+    pub fn with_tile(&self) -> Rig {
+        Rig {
+            reference: Some(Reference::Reflectance(TILE)),
+            ..self.nominal.clone()
+        }
+    }
+
+    /// What the camera sees of the tile.
+    pub fn scene_of_tile(&self, seed: u64) -> Scene {
+        let tile = Arc::new(Kurt::new(TILE, &[]));
+        // Another seed: its noise is not that of the session's frames.
+        Scene::as_built(&self.nominal, tile.clone(), tile, seed.wrapping_add(1))
+    }
+
+    /// Poses for the calibration, spread evenly over the plan.
+    pub fn calibration_poses(poses: &[Pose]) -> Vec<Pose> {
+        let step = poses.len().div_ceil(CALIBRATION_POSES).max(1);
+        poses.iter().step_by(step).copied().collect()
     }
 
     /// How far directions are off that the drawing puts to the arms' readings.
@@ -124,34 +146,5 @@ impl DemoRig {
             light_deg: quantile(&mut of_light, 0.95)?.into(),
             view_deg: quantile(&mut of_view, 0.95)?.into(),
         })
-    }
-}
-
-/// Some frames of the reference, spread evenly over the session.
-pub struct CalibrationFrames<'a> {
-    frames: &'a SimulatedFrames,
-    rows: Vec<FrameRow>,
-}
-
-impl<'a> CalibrationFrames<'a> {
-    /// Of these frames.
-    pub fn of(frames: &'a SimulatedFrames) -> Self {
-        let is_reference = |row: &&FrameRow| row.role == Role::Reference;
-        let of_reference = || frames.rows().iter().filter(is_reference);
-        let step = of_reference().count().div_ceil(CALIBRATION_FRAMES).max(1);
-        Self {
-            frames,
-            rows: of_reference().step_by(step).cloned().collect(),
-        }
-    }
-}
-
-impl FrameSource for CalibrationFrames<'_> {
-    fn rows(&self) -> &[FrameRow] {
-        &self.rows
-    }
-
-    fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
-        self.frames.load(row)
     }
 }

@@ -109,8 +109,8 @@ pub fn doubt(
                 1000.0 * rig.light.distance_m * off.deg.to_radians()
             ),
             match rig.calibration {
-                Some(_) => "the rig has changed since it was calibrated: run gonia calibrate DIR again",
-                None => "run gonia calibrate DIR, and process with the rig.toml that it writes",
+                Some(_) => "the rig has changed since it was calibrated: run gonia calibrate DIR -o DIR/rig.toml again",
+                None => "run gonia calibrate DIR -o DIR/rig.toml, and process again",
             },
         )
     })

@@ -126,7 +126,7 @@ pub enum ProcessError {
     },
     /// There are frames of the reference, and they agree in where they show the target instead.
     #[error(
-        "rig.toml: {what}, and none of the {refused} frames of the reference can be used; run gonia calibrate DIR, and process with the rig.toml that it writes"
+        "rig.toml: {what}, and none of the {refused} frames of the reference can be used; run gonia calibrate DIR -o DIR/rig.toml, and process again"
     )]
     AnotherRig {
         /// Frames of the reference.

@@ -30,7 +30,7 @@ const STEEP_DEG: f64 = 20.0;
 /// A mean must stand out from its own uncertainty by so many of it.
 const CLEAR: f64 = 4.0;
 
-const REMEDY: &str = "run gonia calibrate DIR, and process with the rig.toml that it writes";
+const REMEDY: &str = "run gonia calibrate DIR -o DIR/rig.toml, and process again";
 
 /// What many frames have in common that do not show the target in its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
