@@ -11,7 +11,6 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
         .iter()
         .filter(|frame| matches!(frame.outcome, Outcome::FellBack(_)))
         .count();
-    let offsets = &processed.offsets;
     let left_out = &processed.left_out;
     let mut rows = vec![
         (
@@ -25,13 +24,17 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
         ),
         (
             "camera by the lines".into(),
-            format!(
-                "theta {:+.4} ± {:.4}, phi {:+.4} ± {:.4} degrees from the arm's reading",
-                offsets.theta_mean_deg,
-                offsets.theta_sd_deg,
-                offsets.phi_mean_deg,
-                offsets.phi_sd_deg
-            ),
+            match &processed.offsets {
+                Some(offsets) => format!(
+                    "theta {:+.4} ± {:.4}, phi {:+.4} ± {:.4} degrees from the arm's reading, over {} frames",
+                    offsets.theta_mean_deg,
+                    offsets.theta_sd_deg,
+                    offsets.phi_mean_deg,
+                    offsets.phi_sd_deg,
+                    table::count(offsets.frames as u64)
+                ),
+                None => "not known: no frame shows enough lines".to_owned(),
+            },
         ),
         (
             "calibration".into(),

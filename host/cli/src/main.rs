@@ -5,6 +5,7 @@
 
 mod account;
 mod baselines;
+mod calibrate;
 mod capture;
 mod chart;
 mod chart_motion;
@@ -57,6 +58,8 @@ enum Command {
     Capture(capture::Capture),
     /// Check a session: every checksum, every pose once, every sample
     Verify(verify::Verify),
+    /// The rig's geometry from a capture folder's frames
+    Calibrate(calibrate::Calibrate),
     /// Frames of a capture folder → samples
     Process(process::Process),
     /// One frame as seen from straight above, or merged from its exposures
@@ -109,6 +112,7 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Plan(command) => command.run(),
         Command::Capture(command) => command.run(),
         Command::Verify(command) => command.run(),
+        Command::Calibrate(command) => command.run(),
         Command::Process(command) => command.run(),
         Command::Rectify(command) => command.run(),
         Command::Fill(command) => command.run(),

@@ -3,6 +3,7 @@
 use crate::FileError;
 use crc::{CRC_32_ISCSI, Crc, Digest, Table};
 use gonia_brdf::DenseBrdf;
+use gonia_rig::Frame;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -40,6 +41,27 @@ pub fn of_brdf(brdf: &DenseBrdf) -> String {
             bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
             digest.update(&bytes);
         }
+    }
+    text(digest)
+}
+
+/// The checksum of some bytes.
+pub fn of_bytes(bytes: &[u8]) -> String {
+    let mut digest = CRC.digest();
+    digest.update(bytes);
+    text(digest)
+}
+
+/// The checksum of a frame's size and values.
+pub fn of_frame(frame: &Frame) -> String {
+    let mut digest = CRC.digest();
+    digest.update(&(frame.width as u64).to_le_bytes());
+    let mut bytes = Vec::with_capacity(CHUNK);
+    for pixels in frame.rgb.chunks(CHUNK / 12) {
+        bytes.clear();
+        let values = pixels.iter().flatten();
+        bytes.extend(values.flat_map(|value| value.to_le_bytes()));
+        digest.update(&bytes);
     }
     text(digest)
 }

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`hdr`] | brackets of raw exposures to radiance and its variance |
 //! | [`Registrar`], [`Registration`] | where the target is in a frame, and where the camera must have been |
+//! | [`LinePoint`], [`Search`] | pieces of the fiducial lines, found from near or far, for a calibration |
 //! | [`find_occlusion`], [`Mask`] | what hides the target |
 //! | [`SamplingGrid`], [`PointValue`], [`LeftOut`] | the medians at the grid's points |
 //! | [`IdealLight`] | the irradiance of a point light over the target |
@@ -26,7 +27,9 @@ mod turn;
 
 pub use ideal_light::IdealLight;
 pub use occlusion::{Mask, find_occlusion};
-pub use register::{PoseOffset, Registrar, Registration, RegistrationFailure, RegistrationState};
+pub use register::{
+    LinePoint, PoseOffset, Registrar, Registration, RegistrationFailure, RegistrationState, Search,
+};
 pub use sampling::{LeftOut, PointValue, SamplingGrid};
 pub use turn::Turn;
 

@@ -194,21 +194,51 @@ fn few_steps(
     (line, sums)
 }
 
+/// The stations that show a line, each with its fit and its weight, and their common level: the squared
+/// residual of the median station, per degree of freedom.
+struct Shown<'a> {
+    stations: Vec<(&'a Station, StationFit, f64)>,
+    level: f64,
+}
+
+impl<'a> Shown<'a> {
+    /// `None` where no station shows the line.
+    fn new(strip: &'a LineStrip, line: StripLine, sigma: f64, target: &Target) -> Option<Self> {
+        let shift = |p: &RunSample| line.offset + line.slope * f64::from(p.s);
+        let shows =
+            |fit: &StationFit| fit.line > 0.0 && fit.gain > EXPLAINED * (fit.gain + fit.rss);
+        let mut stations: Vec<(&Station, StationFit, f64)> = strip
+            .stations
+            .iter()
+            .filter_map(|station| {
+                let profile = LineProfile {
+                    half_width: 0.5 * target.line_width_mm * station.px_per_mm,
+                    edge: (target.line_offset_mm - target.material_half_mm) * station.px_per_mm,
+                    sigma,
+                };
+                let fit = profile.fit(&strip.samples[station.run.clone()], shift)?;
+                shows(&fit).then_some((station, fit, 0.0))
+            })
+            .collect();
+        let mut levels: Vec<f64> = stations
+            .iter()
+            .map(|(_, fit, _)| fit.rss / fit.freedom)
+            .collect();
+        if levels.is_empty() {
+            return None;
+        }
+        let middle = levels.len() / 2;
+        // A frame without noise still has the model's own error.
+        let level = (*levels.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-20);
+        for (_, fit, weight) in &mut stations {
+            let excess = fit.rss / fit.freedom / (SOFT_OUTLIER * level);
+            *weight = 1.0 / ((1.0 + excess * excess) * level);
+        }
+        Some(Self { stations, level })
+    }
+}
+
 fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> LineSums {
-    let shift = |p: &RunSample| line.offset + line.slope * f64::from(p.s);
-    let fits: Vec<(&Station, StationFit)> = strip
-        .stations
-        .iter()
-        .filter_map(|station| {
-            let profile = LineProfile {
-                half_width: 0.5 * target.line_width_mm * station.px_per_mm,
-                edge: (target.line_offset_mm - target.material_half_mm) * station.px_per_mm,
-                sigma,
-            };
-            let fit = profile.fit(&strip.samples[station.run.clone()], shift)?;
-            Some((station, fit))
-        })
-        .collect();
     let mut sums = LineSums {
         normal: [[0.0; 3]; 3],
         right: [0.0; 3],
@@ -217,26 +247,12 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
         scatter_px: 0.0,
         level: 0.0,
     };
-    let shows = |fit: &StationFit| fit.line > 0.0 && fit.gain > EXPLAINED * (fit.gain + fit.rss);
-    let mut levels: Vec<f64> = fits
-        .iter()
-        .filter(|(_, fit)| shows(fit))
-        .map(|(_, fit)| fit.rss / fit.freedom)
-        .collect();
-    if levels.is_empty() {
+    let Some(shown) = Shown::new(strip, line, sigma, target) else {
         return sums;
-    }
-    let middle = levels.len() / 2;
-    // A frame without noise still has the model's own error.
-    let level = (*levels.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-20);
-    sums.level = level;
+    };
+    sums.level = shown.level;
     let mut scatter = 0.0;
-    for (station, fit) in &fits {
-        if !shows(fit) {
-            continue;
-        }
-        let excess = fit.rss / fit.freedom / (SOFT_OUTLIER * level);
-        let weight = 1.0 / ((1.0 + excess * excess) * level);
+    for (station, fit, weight) in &shown.stations {
         let along = [1.0, station.s];
         for i in 0..2 {
             for j in 0..2 {
@@ -256,6 +272,63 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
     sums.share = sums.count as f64 / strip.stations.len() as f64;
     sums.scatter_px = (scatter / sums.count as f64).sqrt();
     sums
+}
+
+/// Where a piece of a line is in its strip.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    /// Its middle along the line.
+    pub s: f64,
+    /// How far outwards of the prediction it is, pixels.
+    pub t: f64,
+    /// Information on t, 1/px².
+    pub information: f64,
+    /// Pixels outwards a millimetre.
+    pub px_per_mm: f64,
+}
+
+/// A found line in at most `count` pieces, each placed by its own stations: a lens that is not the one that
+/// the strip was cut for bends the line.
+pub fn pieces(
+    strip: &LineStrip,
+    line: StripLine,
+    sigma: f64,
+    target: &Target,
+    count: usize,
+) -> Vec<Piece> {
+    let Some(shown) = Shown::new(strip, line, sigma, target) else {
+        return Vec::new();
+    };
+    #[derive(Clone, Copy, Default)]
+    struct Sums {
+        stations: f64,
+        px_per_mm: f64,
+        information: f64,
+        along: f64,
+        step: f64,
+    }
+    let mut sums = vec![Sums::default(); count];
+    for (station, fit, weight) in &shown.stations {
+        let place = 0.5 * (station.s + 1.0) * count as f64;
+        let sum = &mut sums[(place.max(0.0) as usize).min(count - 1)];
+        let information = weight * fit.normal[0];
+        sum.stations += 1.0;
+        sum.px_per_mm += station.px_per_mm;
+        sum.information += information;
+        sum.along += information * station.s;
+        sum.step += weight * fit.right[0];
+    }
+    let some = sums.iter().filter(|sum| sum.information > 0.0);
+    some.map(|sum| {
+        let s = sum.along / sum.information;
+        Piece {
+            s,
+            t: line.offset + line.slope * s + sum.step / sum.information,
+            information: sum.information,
+            px_per_mm: sum.px_per_mm / sum.stations,
+        }
+    })
+    .collect()
 }
 
 /// One step of all lines and of the blur they share.

@@ -5,6 +5,9 @@
 //! little, is the prior: what a grazing or half-hidden line leaves open is filled in from it, and
 //! the move is the estimate of the arms' error.
 
+mod line_points;
+mod prior;
+
 use crate::hough::{StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES, rows_of_strips};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
@@ -13,14 +16,9 @@ use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
 use nalgebra::{DMatrix, DVector};
+use prior::{ARM_DEG, ImagePrior};
 use std::ops::Range;
 
-/// Prior standard deviations of θ and φ (the arms' 0.03°), roll, image shift (in frame widths) and
-/// ln magnification.
-const ARM_DEG: f64 = 0.03;
-const ROLL_DEG: f64 = 0.1;
-const SHIFT_WIDTHS: f64 = 5e-4;
-const LN_SCALE: f64 = 2e-3;
 /// What the pinhole model itself is trusted to, pixels at 1000 pixels' width, and never better than
 /// this many pixels.
 const MODEL_PX_PER_1000: f64 = 0.05;
@@ -43,6 +41,8 @@ const MAX_DEVIATION: f64 = 6.0;
 const LOOSE_ARM_DEG: f64 = 0.5;
 /// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
 const LOOSE_ROLL_DEG: f64 = 1.0;
+/// Standard deviation of ln magnification where focal length or distance are not what rig.toml says.
+const LOOSE_LN_SCALE: f64 = 0.02;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
@@ -61,6 +61,7 @@ const RELINEARIZE_PX: f64 = 1.5;
 pub struct Registrar {
     camera: CameraModel,
     target: Target,
+    prior: ImagePrior,
     hough_resolution: f64,
 }
 
@@ -139,6 +140,12 @@ pub enum RegistrationFailure {
         /// Turn about the optical axis, clockwise, degrees.
         roll_deg: f64,
     },
+    /// The lines found are those of the target, but of another size.
+    #[error("the target is seen {:+.2} % larger than there", 100.0 * .share)]
+    Resized {
+        /// By what share of its size the target is larger than it should be.
+        share: f64,
+    },
     /// The lines are where they should be once the frame is turned back.
     #[error("the frame is {0}")]
     Turned(Turn),
@@ -168,6 +175,7 @@ impl Registrar {
         Self {
             camera: CameraModel::new(rig),
             target: rig.target.clone(),
+            prior: ImagePrior::of(rig),
             hough_resolution: HOUGH_RESOLUTION,
         }
     }
@@ -282,18 +290,28 @@ impl Registrar {
         if let Some(turn) = self.turned(frame, view, predicted) {
             return RegistrationFailure::Turned(turn);
         }
+        if let RegistrationFailure::FarFromPose { .. } = failure {
+            return failure;
+        }
         // A target that is moved along two of its lines shows those two in their places.
         let found = [SEARCH_WIDTHS, FAR_WIDTHS]
             .into_iter()
             .find_map(|within| self.displacement(frame, view, predicted, within));
         match found {
-            Some(CameraShift { shift_px, roll, .. }) => {
-                // What moves the fiducial lines more.
-                let by_roll = roll.abs() * predicted_radius_px(predicted, &self.target);
-                if by_roll > shift_px[0].hypotenuse(shift_px[1]) {
-                    let roll_deg = roll.to_degrees();
+            Some(by) => {
+                // What moves the fiducial lines most.
+                let radius_px = predicted_radius_px(predicted, &self.target);
+                let by_roll = by.roll.abs() * radius_px;
+                let by_size = by.log_scale.abs() * radius_px;
+                let by_shift = by.shift_px[0].hypotenuse(by.shift_px[1]);
+                if by_roll > by_shift.max(by_size) {
+                    let roll_deg = by.roll.to_degrees();
                     RegistrationFailure::Rolled { roll_deg }
+                } else if by_size > by_shift {
+                    let share = by.log_scale.exponential() - 1.0;
+                    RegistrationFailure::Resized { share }
                 } else {
+                    let shift_px = by.shift_px;
                     RegistrationFailure::Displaced { shift_px }
                 }
             }
@@ -485,11 +503,27 @@ impl Registrar {
         predicted: &Homography,
         within_widths: f64,
     ) -> Option<CameraShift> {
-        let trust = Trust {
+        // Arms that hold their angles first: what is beside them says less of the image.
+        let trusts = [ARM_DEG, LOOSE_ARM_DEG].map(|arm_deg| Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
-            ..self.trust(ARM_DEG)
-        };
+            ln_scale: LOOSE_LN_SCALE,
+            ..self.trust(arm_deg)
+        });
+        let found = self.elsewhere(frame, view, predicted, within_widths, &trusts)?;
+        Some(found.estimate.shift)
+    }
+
+    /// The four lines within so many frame widths of their predictions, where a camera within one of
+    /// `trusts` sees them: the first one's before the next one's.
+    fn elsewhere(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+        trusts: &[Trust],
+    ) -> Option<Elsewhere> {
         let width = frame.width as f64;
         let search_px = within_widths * width + 4.0;
         let strips = self.strips(frame, predicted, search_px);
@@ -503,22 +537,25 @@ impl Registrar {
             }
             some
         });
-        choices.rev().find_map(|some| {
+        let choices: Vec<_> = choices.rev().collect();
+        let tries = trusts
+            .iter()
+            .flat_map(|trust| choices.iter().map(move |some| (trust, some)));
+        tries.into_iter().find_map(|(trust, some)| {
             if some.iter().flatten().count() < MIN_LINES {
                 return None;
             }
-            let guess = self.estimate(view, &strips, &some, &trust).shift;
-            let moved = CameraShift {
-                shift_px: guess.shift_px,
-                roll: guess.roll,
-                ..CameraShift::default()
-            };
-            let there = self.camera.predict(view, moved);
+            let guess = self.estimate(view, &strips, some, trust).shift;
+            let there = self.camera.predict(view, guess);
             let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
-            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
-            let estimate = self.estimate(view, &strips, &lines, &trust);
-            let fits = lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
-            fits.then_some(estimate.shift)
+            let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+            let estimate = self.estimate(view, &strips, &fit.lines, trust);
+            let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(Elsewhere {
+                strips,
+                fit,
+                estimate,
+            })
         })
     }
 
@@ -526,8 +563,9 @@ impl Registrar {
         let width = self.camera.size_px[0] as f64;
         Trust {
             arm_deg,
-            roll_deg: ROLL_DEG,
-            shift_widths: SHIFT_WIDTHS,
+            roll_deg: self.prior.roll_deg,
+            shift_widths: self.prior.shift_widths,
+            ln_scale: self.prior.ln_scale,
             model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
         }
     }
@@ -630,7 +668,7 @@ impl Registrar {
             trust.roll_deg.to_radians(),
             shift,
             shift,
-            LN_SCALE,
+            trust.ln_scale,
         ]
     }
 
@@ -670,6 +708,13 @@ impl Registrar {
         }
         Homography::from_corners(&corners, &seen)
     }
+}
+
+/// Four lines that are not where they were predicted.
+struct Elsewhere {
+    strips: [LineStrip; 4],
+    fit: LineFit,
+    estimate: Estimate,
 }
 
 struct Solution {
@@ -721,6 +766,8 @@ struct Trust {
     roll_deg: f64,
     /// Standard deviation of the image's shift, in frame widths.
     shift_widths: f64,
+    /// Standard deviation of ln magnification.
+    ln_scale: f64,
     /// Standard deviation of the model's lines, pixels.
     model_px: f64,
 }
@@ -779,3 +826,5 @@ fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
 
 #[cfg(test)]
 mod photographs;
+
+pub use line_points::{LinePoint, Search};

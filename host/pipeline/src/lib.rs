@@ -14,6 +14,7 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | [`samples_of_folder`], [`samples_of`] | a capture folder, or any [`FrameSource`](process::FrameSource) | samples, and what became of each frame |
+//! | [`calibrate()`] | a capture folder's frames | the rig's geometry, with uncertainties |
 //! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples or bins | a dense BRDF, with standard errors where asked for |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
@@ -27,6 +28,7 @@ mod accumulate;
 pub mod baselines;
 pub mod bracket;
 mod bracket_sensor;
+pub mod calibrate;
 pub mod chart;
 pub mod compare;
 mod doubts;
@@ -38,6 +40,7 @@ mod progress;
 pub mod provenance;
 mod samples;
 
+pub use calibrate::{CalibrateError, Calibrated, calibrate};
 pub use compare::{CompareError, Options, Side, Table, compare};
 pub use doubts::DirectionalAlbedo;
 pub use error::Error;

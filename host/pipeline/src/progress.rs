@@ -31,6 +31,10 @@ pub enum Step {
     Comparing,
     /// The paper's method interpolates the check cells.
     PaperMethod,
+    /// Fiducial lines are looked for in frames, for a calibration of the rig.
+    FindingLines,
+    /// The rig's numbers are found from them.
+    SolvingGeometry,
 }
 
 impl fmt::Display for Step {
@@ -48,6 +52,8 @@ impl fmt::Display for Step {
             Step::Tabulating => "tabulating the model",
             Step::Comparing => "comparing",
             Step::PaperMethod => "the paper's method",
+            Step::FindingLines => "finding lines",
+            Step::SolvingGeometry => "solving the geometry",
         })
     }
 }

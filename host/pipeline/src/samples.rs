@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::process::{
     FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, ReferenceCalibration,
-    Sampled, process, process_sampled,
+    Sampled, process, process_sampled, rig_check,
 };
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
@@ -34,7 +34,7 @@ pub fn samples_of(
     masks: &Masks,
     progress: &Progress<'_>,
 ) -> Result<Processed, Error> {
-    watched(source.rows(), progress, |tell| {
+    watched(rig, source.rows(), progress, |tell| {
         process(rig, source, masks, tell)
     })
 }
@@ -52,12 +52,13 @@ pub fn samples_of_sampled(
     progress: &Progress<'_>,
 ) -> Result<Processed, Error> {
     let sampled: Sampled = sampled;
-    watched(rows, progress, |tell| {
+    watched(rig, rows, progress, |tell| {
         process_sampled(rig, rows, sampled, &Masks::default(), tell)
     })
 }
 
 fn watched(
+    rig: &Rig,
     rows: &[FrameRow],
     progress: &Progress<'_>,
     work: impl FnOnce(
@@ -82,12 +83,14 @@ fn watched(
         .map_err(Error::from)
     })?;
     if processed.samples.is_empty() {
-        let why = processed
-            .frame_counts()
-            .refused
-            .into_iter()
-            .max_by_key(|refused| refused.count)
-            .map_or("every point was left out".to_owned(), |r| r.reason);
+        let alike = rig_check::refused_alike(rig, &processed.frames);
+        let refused = processed.frame_counts().refused.into_iter();
+        let commonest = refused.max_by_key(|refused| refused.count);
+        let why = match (alike, commonest) {
+            (Some(alike), _) => alike.remark().to_string(),
+            (None, Some(refused)) => refused.reason,
+            (None, None) => "every point was left out".to_owned(),
+        };
         return Err(Error::NoSamples {
             frames: rows.len(),
             why,

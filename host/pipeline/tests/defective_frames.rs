@@ -391,6 +391,7 @@ fn look(
                 "target elsewhere in the frame"
             }
             Refusal::NotTheTarget(RegistrationFailure::Rolled { .. }) => "camera rolled",
+            Refusal::NotTheTarget(RegistrationFailure::Resized { .. }) => "another size",
             Refusal::NotTheTarget(RegistrationFailure::Turned(_)) => "turned or mirrored",
             Refusal::NoReference | Refusal::Unusable => "no reference",
         };

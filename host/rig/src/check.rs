@@ -3,8 +3,8 @@
 use crate::bench_setup::{Source, check_bench};
 use crate::rig_error::within;
 use crate::{
-    ArmGeometry, CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig, RigError,
-    Sampling, Sensor, Target,
+    ArmGeometry, Calibration, CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig,
+    RigError, Sampling, Sensor, Target,
 };
 use gonia_brdf::Elementary;
 
@@ -35,6 +35,13 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         check_sensor(sensor)?;
     }
     check_sampling(&rig.sampling, &rig.target, &rig.light, &rig.camera)?;
+    if let Some(fault) = rig.calibration.as_ref().and_then(Calibration::fault) {
+        return Err(RigError::new(
+            "calibration",
+            fault,
+            "calibrate the rig again, or remove the table",
+        ));
+    }
     check_bench(
         rig.arms.as_ref(),
         rig.source.as_ref(),

@@ -6,6 +6,7 @@
 //! | [`Rig`] and its parts | geometry, sensor, reference, sampling, as `rig.toml` has them |
 //! | [`ArmPorts`], [`Source`], [`SessionSettings`], [`Genicam`] | the bench setup of a session |
 //! | [`ArmGeometry`], [`TargetPlace`], [`Placement`] | arms and target as they were built, and where light and camera stand |
+//! | [`Calibration`] | what a calibration of the geometry found, and how well |
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
@@ -15,6 +16,7 @@
 
 mod arm_geometry;
 mod bench_setup;
+mod calibration;
 mod camera_model;
 mod cell_mask;
 mod check;
@@ -24,6 +26,7 @@ mod frame;
 mod frame_row;
 mod genicam;
 mod homography;
+mod number;
 mod raw_frame;
 mod remark;
 mod rig;
@@ -36,6 +39,7 @@ pub mod stratum;
 
 pub use arm_geometry::{ArmGeometry, Placement, TargetPlace};
 pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
+pub use calibration::Calibration;
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
 pub use check::{check_rig, rig_remarks};

@@ -3,6 +3,7 @@
 use crate::arm_geometry::Placement;
 use crate::arm_geometry::{ArmGeometry, TargetPlace};
 use crate::bench_setup::{ArmPorts, SessionSettings, Source};
+use crate::calibration::Calibration;
 use crate::sensor::Sensor;
 use gonia_brdf::{Direction, Pose};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,9 @@ pub struct Rig {
     /// How a session goes, where it differs from the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<SessionSettings>,
+    /// How well the geometry is known, where it was calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<Calibration>,
 }
 
 /// A point source.
@@ -238,6 +242,7 @@ impl Rig {
             arms: None,
             source: None,
             session: None,
+            calibration: None,
         }
     }
 

@@ -6,6 +6,7 @@
 //! exactly 1, so that radiance over cos θi is the BRDF there, and eq. (3) of the paper returns the
 //! BRDF itself from a perfect chain.
 
+mod as_built;
 mod light;
 mod noise;
 mod occluder;
@@ -14,6 +15,7 @@ mod optics;
 mod sensor;
 mod target;
 
+pub use as_built::as_built;
 pub use light::Beam;
 pub use noise::Noise;
 pub use occluder::Occluder;

@@ -51,6 +51,11 @@ impl SimulatedFrames {
         });
         self.exposed_at.push(exposed_at);
     }
+
+    /// The frames, by number, each with where the arms truly were.
+    pub fn exposures(&self) -> impl Iterator<Item = (&FrameRow, Pose)> {
+        self.rows.iter().zip(self.exposed_at.iter().copied())
+    }
 }
 
 impl FrameSource for SimulatedFrames {

@@ -21,6 +21,7 @@ mod samples;
 mod verify;
 mod writer;
 
+pub use clock::now;
 pub use entry::{CHANGE_THE_SAMPLE, Entry, PoseDone, SessionEnd};
 pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 pub use provenance::{ControllerIdentity, SessionProvenance};

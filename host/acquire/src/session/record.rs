@@ -54,6 +54,7 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
             (5, place.unwrap_or(0) as f64, 0.0)
         }
         Some(RegistrationFailure::Rolled { roll_deg }) => (6, roll_deg, 0.0),
+        Some(RegistrationFailure::Resized { share }) => (7, share, 0.0),
     };
     out.extend([outcome, why]);
     let Pose { light, view } = frame.reading;
@@ -119,6 +120,7 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
         4 => Some(RegistrationFailure::Displaced { shift_px: [a, b] }),
         5 => Some(RegistrationFailure::Turned(*Turn::ALL.get(a as usize)?)),
         6 => Some(RegistrationFailure::Rolled { roll_deg: a }),
+        7 => Some(RegistrationFailure::Resized { share: a }),
         _ => return None,
     };
     let outcome = match (outcome, reason) {
@@ -248,6 +250,9 @@ pub(crate) mod tests {
             ))),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Rolled {
                 roll_deg: -0.7,
+            })),
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Resized {
+                share: 0.004,
             })),
             Outcome::Refused(Refusal::NotTheTarget(reason)),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::FarFromPose {

@@ -1,6 +1,7 @@
 //! `gonia demo`: a whole measurement on the simulated rig. The arms' controllers run the real
 //! firmware core behind the real wire, in virtual time; every frame goes through the real chain.
 
+mod rig;
 mod session;
 mod summary;
 
@@ -10,7 +11,7 @@ use crate::remarks;
 use anyhow::{Context, Result, bail};
 use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::travelling;
-use gonia_brdf::model::{Kurt, Material};
+use gonia_brdf::model::Material;
 use gonia_brdf::{DenseBrdf, Pose};
 use gonia_formats::dense::write_dense;
 use gonia_formats::frames_csv::write_frames_csv;
@@ -20,17 +21,19 @@ use gonia_formats::samples::write_noted_samples;
 use gonia_formats::{Summary, cell_mask, check_writable, checksum};
 use gonia_pipeline::process::{FrameSource, Masks, Processed};
 use gonia_pipeline::provenance::{Provenance, of_this_program};
-use gonia_pipeline::{FillOptions, Options, Side, Table, compare, fill, samples_of};
+use gonia_pipeline::{FillOptions, Options, Side, Table, calibrate, compare, fill, samples_of};
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
 use gonia_report::files::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
 use gonia_report::{ReportInput, write_report, write_sphere};
-use gonia_rig::{CellMask, DenseFile, Rig, Scale};
-use gonia_sim::scene::{Scene, SceneGeometry};
-use session::Session;
+use gonia_rig::{CellMask, DenseFile, Rig, Role, Scale};
+use rig::DemoRig;
+use session::{Lab, Session};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
+
+/// The rig's drawing; `rig.toml` is what the calibration found.
+const NOMINAL: &str = "nominal.toml";
 
 /// Measures a material of known BRDF, by default a two-thread fabric, on the simulated rig.
 #[derive(clap::Args)]
@@ -54,6 +57,9 @@ pub struct Demo {
     /// Keep the frames as a capture folder (the whole plan's take 16 GB)
     #[arg(long)]
     keep_frames: bool,
+    /// A rig without a flaw, of which nothing need be found out: for tests of other things
+    #[arg(long)]
+    ideal_rig: bool,
     /// Seed of all that is random in the simulation
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -75,31 +81,43 @@ impl Demo {
         check_writable(&self.out)?;
         let run = Run {
             material: Material::named(&self.material).context("--material")?,
-            rig: Rig::paper(frame_px),
+            rig: DemoRig::new(frame_px, self.ideal_rig),
             poses: travelling(&rings).poses,
             progress: Progress::new(),
             demo: self,
         };
-        let (session, processed) = run.measure()?;
-        let frame_rows = account::describe(&processed);
-        let (mut summary, dense, measured) = run.fill(step, &session, processed)?;
+        let measured = run.measure()?;
+        remarks::print(&measured.processed.remarks);
+        let mut rows = measured.rig_rows;
+        rows.extend(account::describe(&measured.processed));
+        let (mut summary, dense, cells) = run.fill(step, &measured.session, measured.processed)?;
         run.write_truth(&dense, &mut summary)?;
-        run.draw(&dense, &measured, &mut summary)?;
+        run.draw(&dense, &cells, &measured.rig, &mut summary)?;
         summary::print(
             &summary,
-            &session,
-            &frame_rows,
+            &measured.session,
+            &rows,
             began.elapsed().as_secs_f64(),
         );
         Ok(())
     }
 }
 
+/// What was measured, and with what rig.
+struct Measured {
+    session: Session,
+    /// As it was calibrated.
+    rig: Rig,
+    /// What the calibration brought, for the table.
+    rig_rows: Vec<(String, String)>,
+    processed: Processed,
+}
+
 /// A demo under way.
 struct Run {
     demo: Demo,
     material: Material,
-    rig: Rig,
+    rig: DemoRig,
     poses: Vec<Pose>,
     progress: Progress,
 }
@@ -116,39 +134,90 @@ impl Run {
             ("seed".into(), self.demo.seed.to_string()),
             (
                 "rig".into(),
-                format!("simulated, frames of {} px", self.rig.camera.width_px),
+                format!(
+                    "simulated, frames of {} px",
+                    self.rig.nominal.camera.width_px
+                ),
             ),
             ("plan".into(), format!("{} poses", self.poses.len())),
         ])
     }
 
-    /// Moves the arms through the plan, and makes samples of the frames.
-    fn measure(&self) -> Result<(Session, Processed)> {
-        write_rig(&self.path("rig.toml"), &self.rig)?;
+    /// Moves the arms through the plan, calibrates the rig, and makes samples of the frames.
+    fn measure(&self) -> Result<Measured> {
+        write_rig(&self.path(NOMINAL), &self.rig.nominal)?;
         write_plan_csv(&self.path("plan.csv"), &self.poses)?;
         let keep_frames = self.demo.keep_frames || self.demo.quick;
-        let mut camera = SimulatedFrames::new(Scene::new(
-            SceneGeometry::of_rig(&self.rig),
-            self.material.brdf.clone(),
-            Arc::new(Kurt::white_reference_fabric()),
-            self.demo.seed,
-        ));
+        let material = self.material.brdf.clone();
+        let mut camera = SimulatedFrames::new(self.rig.scene(material, self.demo.seed));
         if keep_frames {
             camera.keep_frames(&self.demo.out)?;
         }
+        let mut lab = self
+            .progress
+            .stage("calibrating encoders", |_| Lab::open(self.demo.seed))?;
+        let rig = self.calibrated_rig(&mut lab)?;
+        write_rig(&self.path("rig.toml"), &rig)?;
         let session = self.progress.stage("moving and triggering", |tell| {
-            session::measure(&self.poses, self.demo.seed, &mut camera, tell)
+            lab.measure(&self.poses, &mut camera, tell)
         })?;
         if keep_frames {
             write_frames_csv(&self.path("frames.csv"), camera.rows())?;
         }
         let masks = Masks::default();
-        let processed = samples_of(&self.rig, &camera, &masks, &self.progress.watch())?;
+        let processed = samples_of(&rig, &camera, &masks, &self.progress.watch())?;
         let note = processed.note(self.facts());
         self.progress.stage("writing samples", |_| {
             write_noted_samples(&self.path("samples.npy"), &processed.samples, &note)
         })?;
-        Ok((session, processed))
+        Ok(Measured {
+            rig_rows: self.rig_rows(&rig, &camera, &processed),
+            session,
+            rig,
+            processed,
+        })
+    }
+
+    /// The rig as frames of a white tile show it.
+    fn calibrated_rig(&self, lab: &mut Lab) -> Result<Rig> {
+        if self.rig.is_ideal() {
+            return Ok(self.rig.nominal.clone());
+        }
+        let mut frames = SimulatedFrames::new(self.rig.scene_of_tile(self.demo.seed));
+        let poses = DemoRig::calibration_poses(&self.poses);
+        self.progress.stage("moving over a white tile", |tell| {
+            let mut session = Session::default();
+            lab.expose(Role::Reference, &poses, &mut frames, &mut session, tell)
+        })?;
+        let found = calibrate(&self.rig.with_tile(), &frames, &self.progress.watch())?;
+        remarks::print(&found.remarks);
+        let mut rig = found.rig;
+        // The session's reference is another one.
+        rig.reference = None;
+        if let Some(calibration) = &mut rig.calibration {
+            // No date of ours: the same demo leaves the same bytes.
+            calibration.date = "simulated".to_owned();
+        }
+        Ok(rig)
+    }
+
+    /// What the calibration brought.
+    fn rig_rows(
+        &self,
+        rig: &Rig,
+        camera: &SimulatedFrames,
+        processed: &Processed,
+    ) -> Vec<(String, String)> {
+        let before = self.rig.errors_by_drawing(camera);
+        let after = self.rig.errors_of(rig, camera, &processed.frames);
+        let (Some(before), Some(after)) = (before, after) else {
+            return Vec::new();
+        };
+        let text = format!(
+            "light {:.3} before calibration, {:.3} after; view {:.3} before, {:.3} after (degrees, 95 % of directions)",
+            before.light_deg, after.light_deg, before.view_deg, after.view_deg
+        );
+        vec![("rig: direction error".to_owned(), text)]
     }
 
     /// Interpolates the samples, and writes the dense BRDF and which cells were measured.
@@ -200,7 +269,13 @@ impl Run {
     }
 
     /// Draws the report and writes the summary.
-    fn draw(&self, dense: &DenseFile, measured: &CellMask, summary: &mut Summary) -> Result<()> {
+    fn draw(
+        &self,
+        dense: &DenseFile,
+        measured: &CellMask,
+        rig: &Rig,
+        summary: &mut Summary,
+    ) -> Result<()> {
         let note = |summary: &mut Summary| {
             summary.stages = self.progress.stages();
             summary::list_files(summary, &self.demo.out);
@@ -214,7 +289,7 @@ impl Run {
                 &ReportInput {
                     truth: Some(self.material.brdf.as_ref()),
                     measured: Some(measured),
-                    rig: Some(&self.rig),
+                    rig: Some(rig),
                     ..ReportInput::new(summary, &dense.brdf)
                 },
             )

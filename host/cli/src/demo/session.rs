@@ -1,10 +1,10 @@
-//! The session on the simulated rig: both arms through all poses, once over the reference and once
-//! over the material.
+//! The sessions on the simulated rig: both arms through poses over a white tile, over the reference and over
+//! the material.
 
-use crate::say::errln;
 use anyhow::Result;
 use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome, run_session};
+use gonia_acquire::motion::calibrate_encoders;
 use gonia_brdf::Pose;
 use gonia_formats::{Pointing, Refused};
 use gonia_rig::Role;
@@ -13,6 +13,7 @@ use gonia_sim::rig::SimRig;
 use std::collections::BTreeMap;
 
 /// What the arms did.
+#[derive(Default)]
 pub struct Session {
     /// Triggers whose arms were within the pointing limit by encoder.
     pub kept: usize,
@@ -46,34 +47,38 @@ impl Session {
     }
 }
 
-/// Drives two simulated controllers through the poses and exposes a frame at each trigger.
-pub fn measure(
-    poses: &[Pose],
-    seed: u64,
-    camera: &mut SimulatedFrames,
-    progress: &dyn Fn(f64),
-) -> Result<Session> {
-    let rig = SimRig::new(seed, FaultPlan::default());
-    let mut arms = Arms::connect(
-        Box::new(rig.port(Arm::Light)),
-        Box::new(rig.port(Arm::Camera)),
-    )?;
-    if let Some(warning) = arms.calibration_warning()? {
-        errln!("warning: {warning}");
+/// Two simulated controllers, and the arms that they drive.
+pub struct Lab {
+    rig: SimRig,
+    arms: Arms,
+}
+
+impl Lab {
+    /// Connects, and calibrates the arms' encoders.
+    pub fn open(seed: u64) -> Result<Self> {
+        let rig = SimRig::new(seed, FaultPlan::default());
+        let mut arms = Arms::connect(
+            Box::new(rig.port(Arm::Light)),
+            Box::new(rig.port(Arm::Camera)),
+        )?;
+        calibrate_encoders(&rig, &mut arms)?;
+        Ok(Self { rig, arms })
     }
-    let mut session = Session {
-        kept: 0,
-        refused: BTreeMap::new(),
-        retakes: 0,
-        by_encoder_deg: Vec::new(),
-        by_shaft_deg: Vec::new(),
-        virtual_s: 0.0,
-    };
-    let mut done = 0;
-    for role in [Role::Reference, Role::Material] {
-        let summary = run_session(&mut arms, poses, &mut |outcome| {
+
+    /// Drives the arms through poses over what lies on the target, and exposes a frame at each trigger.
+    pub fn expose(
+        &mut self,
+        role: Role,
+        poses: &[Pose],
+        camera: &mut SimulatedFrames,
+        session: &mut Session,
+        progress: &dyn Fn(f64),
+    ) -> Result<()> {
+        let mut done = 0;
+        let rig = &self.rig;
+        let summary = run_session(&mut self.arms, poses, &mut |outcome| {
             done += 1;
-            progress(done as f64 / (2 * poses.len()) as f64);
+            progress(done as f64 / poses.len() as f64);
             match outcome {
                 ShotOutcome::Kept(shot) => {
                     let exposed_at =
@@ -97,8 +102,23 @@ pub fn measure(
         })?;
         session.retakes += summary.retakes;
         session.virtual_s += summary.duration_us as f64 * 1e-6;
+        Ok(())
     }
-    Ok(session)
+
+    /// A session: once over the reference, once over the material.
+    pub fn measure(
+        &mut self,
+        poses: &[Pose],
+        camera: &mut SimulatedFrames,
+        progress: &dyn Fn(f64),
+    ) -> Result<Session> {
+        let mut session = Session::default();
+        for (half, role) in [Role::Reference, Role::Material].into_iter().enumerate() {
+            let tell = |share: f64| progress(0.5 * (half as f64 + share));
+            self.expose(role, poses, camera, &mut session, &tell)?;
+        }
+        Ok(session)
+    }
 }
 
 /// The largest difference of two poses over the four axes, degrees.

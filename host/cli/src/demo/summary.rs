@@ -11,7 +11,7 @@ use gonia_rig::CellMask;
 use std::path::Path;
 
 /// What each file of a demo holds.
-const FILES: [(&str, &str); 11] = [
+const FILES: [(&str, &str); 12] = [
     (REPORT, "the report"),
     ("sphere.png", "the material on a sphere"),
     (DENSE, "the dense BRDF"),
@@ -23,7 +23,8 @@ const FILES: [(&str, &str); 11] = [
     ("samples.npy.toml", "scale and provenance of these samples"),
     (MEASURED, "one bit a cell: which ones hold a sample"),
     ("plan.csv", "the poses in travelling order"),
-    ("rig.toml", "the rig"),
+    ("rig.toml", "the rig, calibrated"),
+    ("nominal.toml", "the rig's drawing"),
     ("frames.csv", "the frames, if kept"),
     (SUMMARY, "these figures"),
 ];

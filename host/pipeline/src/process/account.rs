@@ -120,7 +120,7 @@ impl AddAssign for LeftOutCounts {
 }
 
 /// The distribution of a session's pose offsets, over its locked frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffsetStatistics {
     /// Locked frames.
     pub frames: usize,
@@ -137,8 +137,8 @@ pub struct OffsetStatistics {
 }
 
 impl OffsetStatistics {
-    /// Over the locked ones among some frames.
-    pub fn of(frames: &[FrameReport]) -> Self {
+    /// Over the locked ones among some frames; `None` where none is.
+    pub fn of(frames: &[FrameReport]) -> Option<Self> {
         let locked = || {
             frames
                 .iter()
@@ -147,7 +147,7 @@ impl OffsetStatistics {
         };
         let n = locked().count();
         if n == 0 {
-            return Self::default();
+            return None;
         }
         let moments = |of: fn(&PoseOffset) -> f64| {
             let mean = locked().map(|o| of(&o)).sum::<f64>() / n as f64;
@@ -156,7 +156,7 @@ impl OffsetStatistics {
         };
         let (theta_mean_deg, theta_sd_deg) = moments(|o| o.theta_deg);
         let (phi_mean_deg, phi_sd_deg) = moments(|o| o.phi_deg);
-        Self {
+        Some(Self {
             frames: n,
             theta_mean_deg,
             theta_sd_deg,
@@ -165,7 +165,7 @@ impl OffsetStatistics {
             largest_deg: locked()
                 .map(|o| o.theta_deg.abs().max(o.phi_deg.abs()))
                 .fold(0.0, f64::max),
-        }
+        })
     }
 }
 
@@ -191,14 +191,11 @@ mod tests {
             frame(Outcome::Locked, -0.03),
             frame(lost, 5.0),
         ];
-        let statistics = OffsetStatistics::of(&frames);
+        let statistics = OffsetStatistics::of(&frames).unwrap();
         assert_eq!(statistics.frames, 2);
         assert!((statistics.theta_mean_deg + 0.01).abs() < 1e-12);
         assert!((statistics.theta_sd_deg - 0.02).abs() < 1e-12);
         assert_eq!(statistics.largest_deg, 0.03);
-        assert_eq!(
-            OffsetStatistics::of(&frames[2..]),
-            OffsetStatistics::default()
-        );
+        assert_eq!(OffsetStatistics::of(&frames[2..]), None);
     }
 }

@@ -8,12 +8,13 @@ use crate::process::ReferenceSummary;
 use crate::process::account::LeftOutCounts;
 use crate::process::central::{CentralField, fit_central};
 use crate::process::coverage::{CoverageError, check_central, check_matches};
+use crate::process::light_check;
 use crate::process::linearity;
 use crate::process::masks::Masks;
 use crate::process::reference::{ReferenceFrame, References};
 use crate::process::reflectance::KnownReference;
 use gonia_brdf::{Pose, Vec3};
-use gonia_imaging::Mask;
+use gonia_imaging::{Mask, SamplingGrid};
 use gonia_rig::{FrameRow, Remark, Rig};
 
 /// How light and beam were divided out.
@@ -117,15 +118,15 @@ impl Calibrator {
         }
     }
 
-    /// What speaks against radiance that is proportional to light. `centre` is as in
-    /// [`Calibrator::new`].
-    pub fn doubt(&self, rig: &Rig, centre: usize) -> Option<Remark> {
-        match &self.method {
-            Method::Known(reference) => {
-                linearity::doubt(rig, self.references.frames(), reference, centre)
-            }
-            Method::Unknown(_) | Method::Geometric => None,
-        }
+    /// What speaks against radiance that is proportional to light, and against the light's place.
+    pub fn doubts(&self, rig: &Rig, grid: &SamplingGrid) -> Vec<Remark> {
+        let Method::Known(reference) = &self.method else {
+            return Vec::new();
+        };
+        let frames = self.references.frames();
+        let linearity = linearity::doubt(rig, frames, reference, grid.centre());
+        let light = light_check::doubt(rig, frames, reference, grid.points_mm());
+        linearity.into_iter().chain(light).collect()
     }
 
     /// What hid the target in the reference's frames.

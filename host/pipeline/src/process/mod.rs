@@ -7,11 +7,13 @@ pub mod account;
 mod calibration;
 pub mod central;
 pub mod coverage;
+mod light_check;
 mod linearity;
 pub mod masks;
 mod reference;
-mod reflectance;
+pub(crate) mod reflectance;
 mod remarks;
+pub(crate) mod rig_check;
 pub mod sampled;
 pub mod source;
 
@@ -53,8 +55,8 @@ pub struct Processed {
     pub frames: Vec<FrameReport>,
     /// Points of used material frames that became no sample.
     pub left_out: LeftOutCounts,
-    /// Estimated camera direction minus reading, over the locked frames.
-    pub offsets: OffsetStatistics,
+    /// Estimated camera direction minus reading, over the locked frames; `None` where no frame is.
+    pub offsets: Option<OffsetStatistics>,
     /// The reference.
     pub reference: ReferenceSummary,
     /// What hid the target in the reference's frames.
@@ -121,6 +123,16 @@ pub enum ProcessError {
         refused: usize,
         /// What was found in the first of them.
         why: String,
+    },
+    /// There are frames of the reference, and they agree in where they show the target instead.
+    #[error(
+        "rig.toml: {what}, and none of the {refused} frames of the reference can be used; run gonia calibrate DIR -o DIR/rig.toml, and process again"
+    )]
+    AnotherRig {
+        /// Frames of the reference.
+        refused: usize,
+        /// What they agree in.
+        what: String,
     },
     /// Eq. (3) needs more of the reference than was measured.
     #[error(transparent)]
@@ -217,6 +229,10 @@ pub fn process_sampled(
         },
     )?;
     if references.is_empty() && !reference.is_empty() {
+        if let Some(alike) = rig_check::refused_alike(rig, &frames) {
+            let (refused, what) = (reference.len(), alike.to_string());
+            return Err(ProcessError::AnotherRig { refused, what });
+        }
         let why = frames.iter().find_map(|frame| match frame.outcome {
             Outcome::Refused(Refusal::NotTheTarget(reason)) => Some(reason.to_string()),
             _ => None,
@@ -245,6 +261,8 @@ pub fn process_sampled(
             left_out += counts;
         },
     )?;
+    let mut remarks = rig_check::doubts(rig, rows, &frames);
+    remarks.extend(calibrator.doubts(rig, &bench.grid));
     Ok(Processed {
         offsets: OffsetStatistics::of(&frames),
         samples,
@@ -252,10 +270,7 @@ pub fn process_sampled(
         frames,
         left_out,
         reference: calibrator.summary(),
-        remarks: calibrator
-            .doubt(rig, bench.grid.centre())
-            .into_iter()
-            .collect(),
+        remarks,
         masks: calibrator.into_masks(),
     })
 }
@@ -278,7 +293,7 @@ fn sample_rows(
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.
-fn load(
+pub(crate) fn load(
     rig: &Rig,
     source: &dyn FrameSource,
     row: &FrameRow,

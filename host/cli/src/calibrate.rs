@@ -1,0 +1,166 @@
+//! `gonia calibrate`: a rig's geometry from its own frames.
+
+use crate::progress::Progress;
+use crate::say::outln;
+use crate::{remarks, table};
+use anyhow::Result;
+use gonia_acquire::session::{RIG, now};
+use gonia_brdf::Elementary;
+use gonia_formats::{CaptureFolder, check_output, rig_toml};
+use gonia_pipeline::calibrate::{LightState, Number, NumberState, Spread};
+use gonia_pipeline::{Calibrated, calibrate};
+use gonia_rig::rig_remarks;
+use std::path::PathBuf;
+
+/// Finds the rig's geometry from the frames of a capture folder: the camera and its arm from the fiducial
+/// lines, the light and its arm from the shading on the reference.
+#[derive(clap::Args)]
+#[command(
+    after_long_help = "Example:\n  gonia calibrate capture/                   # prints what it finds\n  gonia calibrate capture/ -o rig.toml       # and writes a rig.toml to use from now on\n\nFrames need poses of many directions; 60 of the reference are plenty. Lines are found although the\ncamera is rolled by 5 degrees, aims 40 mm aside, is 5 % nearer, or the arms' zeros are off by 2 degrees.\nWithout -o nothing is written. The rig that is written holds the numbers found and a table [calibration]\nwith their uncertainties; comments and the order of keys are not kept. A rig that was calibrated can be\ncalibrated again: its own numbers are the first guess then. The light needs frames of role 'reference'\nwhose reflectance [reference] gives, or that scatter as a Lambertian surface does."
+)]
+pub struct Calibrate {
+    /// The capture folder
+    folder: PathBuf,
+    /// Where to write the calibrated rig [default: nowhere]
+    #[arg(short, long, value_name = "RIG")]
+    output: Option<PathBuf>,
+}
+
+impl Calibrate {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        if let Some(output) = &self.output {
+            check_output(output, &[&self.folder.join("frames.csv")])?;
+        }
+        let progress = Progress::new();
+        let folder = CaptureFolder::open(&self.folder)?;
+        let mut calibrated = calibrate(folder.rig(), &folder, &progress.watch())?;
+        if let Some(calibration) = &mut calibrated.rig.calibration {
+            calibration.date = now();
+        }
+        remarks::print(&rig_remarks(self.folder.join(RIG).display(), folder.rig()));
+        remarks::print(&calibrated.remarks);
+        print_numbers(&calibrated.numbers);
+        let mut rows = describe(&calibrated);
+        if let Some(output) = &self.output {
+            rig_toml::write_rig(output, &calibrated.rig)?;
+            rows.push(("written".into(), output.display().to_string()));
+        }
+        table::print(&rows);
+        Ok(())
+    }
+}
+
+/// The numbers, a line each.
+fn print_numbers(numbers: &[Number]) {
+    let head = ["number", "rig.toml", "found", "u", "prior", ""];
+    let mut lines = vec![head.map(str::to_owned)];
+    for number in numbers {
+        // Two digits of the uncertainty, and as many decimals of the value.
+        let decimals = (1.0 - number.u.decimal_log().floor()).clamp(0.0, 9.0) as usize;
+        let show = |value: f64| format!("{value:.decimals$}");
+        let state = match number.state {
+            NumberState::Found => format!("{:.0} % determined", 100.0 * number.determined()),
+            NumberState::Undetermined => "kept: the frames do not tell".to_owned(),
+            NumberState::NotNeeded => "kept: the frames do not need it".to_owned(),
+        };
+        lines.push([
+            number.name.to_owned(),
+            show(number.nominal),
+            show(number.found),
+            show(number.u),
+            show(number.prior),
+            state,
+        ]);
+    }
+    let width = |k: usize| lines.iter().map(|l| l[k].len()).max().unwrap_or(0);
+    let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(width);
+    for [name, nominal, found, u, prior, state] in &lines {
+        outln!("{name:<a$}  {nominal:>b$}  {found:>c$}  {u:>d$}  {prior:>e$}  {state}");
+    }
+}
+
+/// What the calibration stands on, and what it means for directions.
+fn describe(found: &Calibrated) -> Vec<(String, String)> {
+    let row = |name: &str, value: String| (name.to_owned(), value);
+    let angles = |s: Spread| format!("{:.3} / {:.3} / {:.3} deg", s.p50, s.p95, s.max);
+    let mut rows = vec![
+        row(
+            "frames",
+            format!("{} looked at, {} used", found.frames[0], found.frames[1]),
+        ),
+        row(
+            "lines",
+            format!(
+                "{:.2} px off before, {:.3} px after (RMS, median frame)",
+                found.lines_px[0], found.lines_px[1]
+            ),
+        ),
+        row(
+            "camera's arm",
+            format!(
+                "repeats within {:.4} deg in theta, {:.4} deg in phi",
+                found.camera_arm_deg[0], found.camera_arm_deg[1]
+            ),
+        ),
+    ];
+    rows.extend(describe_light(&found.light));
+    let [light, view] = found.changes;
+    rows.push(row(
+        "light moved by",
+        format!("{} (median / p95 / max)", angles(light)),
+    ));
+    rows.push(row(
+        "view moved by",
+        format!("{} (median / p95 / max)", angles(view)),
+    ));
+    let [light, view] = found.direction_u;
+    if let LightState::Found { .. } = found.light {
+        rows.push(row("u of light", angles(light)));
+    }
+    rows.push(row("u of view", angles(view)));
+    rows
+}
+
+fn describe_light(light: &LightState) -> Vec<(String, String)> {
+    let row = |name: &str, value: String| (name.to_owned(), value);
+    match *light {
+        LightState::Found {
+            frames,
+            shading,
+            lamp,
+            arm_deg,
+        } => vec![
+            row(
+                "shading",
+                format!(
+                    "{:.2} % off before, {:.2} % after (RMS, median of {frames} frames of the reference)",
+                    100.0 * shading[0],
+                    100.0 * shading[1]
+                ),
+            ),
+            row("lamp", format!("steady within {:.2} %", 100.0 * lamp)),
+            row(
+                "light's arm",
+                format!(
+                    "repeats within {:.4} deg in theta, {:.4} deg in phi",
+                    arm_deg[0], arm_deg[1]
+                ),
+            ),
+        ],
+        LightState::NoReference { frames, needed } => vec![row(
+            "light",
+            format!(
+                "left as it is: {frames} frames of the reference show anything, and {needed} are needed"
+            ),
+        )],
+        LightState::ReferenceUnlike { level, within } => vec![row(
+            "light",
+            format!(
+                "left as it is: the reference does not scatter as rig.toml says (levels differ by {:.1} %, values of a frame by {:.1} %); give its reflectance, or a more diffuse one",
+                100.0 * level,
+                100.0 * within
+            ),
+        )],
+    }
+}

@@ -1,0 +1,92 @@
+//! Pieces of the fiducial lines, for a calibration of the rig: found near where the rig has them, or from
+//! far off.
+
+use super::{Elsewhere, MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
+use crate::lines::SIDES;
+use crate::refine::{Starts, fit_lines, pieces};
+use gonia_brdf::{Direction, Elementary};
+use gonia_rig::{CameraShift, Frame};
+
+/// Pieces of a line.
+const PIECES: usize = 9;
+
+/// A piece of a fiducial line in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinePoint {
+    /// Which coordinate of the target is constant on its line: 0 for x, 1 for y.
+    pub axis: usize,
+    /// The sign of that coordinate.
+    pub sign: f64,
+    /// A pixel position on the middle of the line, as the lens shows it.
+    pub pixel: [f64; 2],
+    /// Pixels across the line a millimetre of the target.
+    pub px_per_mm: f64,
+    /// Standard uncertainty across the line, pixels: what the noise of the frame leaves.
+    pub u_px: f64,
+}
+
+/// How far from where the rig has them lines are looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Search {
+    /// A rig as it was drawn: camera rolled by 5°, lines within a seventh of the frame's width.
+    Far,
+    /// A rig that is known to a hundredth of the frame's width.
+    About,
+    /// A calibrated rig: a few pixels.
+    Near,
+}
+
+impl Registrar {
+    /// The pieces of the lines that a frame shows; none where the target cannot be recognised. With
+    /// [`Search::Near`] some lines may be missing; the other searches want all four.
+    pub fn line_points(&self, frame: &Frame, view: Direction, search: Search) -> Vec<LinePoint> {
+        let predicted = self.camera.predict(view, CameraShift::default());
+        let width = frame.width as f64;
+        let (strips, fit) = match search {
+            Search::Near => {
+                let strips = self.strips(frame, &predicted, NEAR_WIDTHS * width + 4.0);
+                let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+                (strips, fit)
+            }
+            Search::Far | Search::About => {
+                let (within_widths, trust) = loose(search, width);
+                let found = self.elsewhere(frame, view, &predicted, within_widths, &[trust]);
+                let Some(Elsewhere { strips, fit, .. }) = found else {
+                    return Vec::new();
+                };
+                (strips, fit)
+            }
+        };
+        let mut points = Vec::new();
+        for ((side, strip), line) in SIDES.iter().zip(&strips).zip(&fit.lines) {
+            let Some(line) = line else { continue };
+            let floor = self.line_variance(strip);
+            for piece in pieces(strip, line.line, fit.sigma_px, &self.target, PIECES) {
+                points.push(LinePoint {
+                    axis: side.axis,
+                    sign: side.sign,
+                    pixel: self.camera.distort(strip.point(piece.s, piece.t)),
+                    px_per_mm: piece.px_per_mm,
+                    u_px: (1.0 / piece.information + floor).sqrt(),
+                });
+            }
+        }
+        points.retain(|p| p.pixel[0].hypotenuse(p.pixel[1]).is_finite() && p.px_per_mm > 0.0);
+        points
+    }
+}
+
+/// How far to look, and how far a camera may be from what the rig says.
+fn loose(search: Search, width: f64) -> (f64, Trust) {
+    let is_far = search == Search::Far;
+    let pick = |far: f64, about: f64| if is_far { far } else { about };
+    let trust = Trust {
+        arm_deg: pick(1.2, 0.3),
+        roll_deg: pick(3.0, 0.5),
+        shift_widths: pick(0.04, 0.01),
+        // A lens that is not in the rig yet bends the lines by so much.
+        model_px: (pick(1e-3, 5e-4) * width).max(5.0 * MODEL_PX),
+        ln_scale: pick(0.05, 0.01),
+    };
+    (pick(0.15, 0.03), trust)
+}

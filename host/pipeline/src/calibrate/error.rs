@@ -1,0 +1,62 @@
+//! Why a rig cannot be calibrated.
+
+use crate::process::ProcessError;
+use crate::progress::Cancelled;
+
+/// Why a rig cannot be calibrated. Each says in one line what was found and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// No frame can be used; the first one's reason.
+    #[error(transparent)]
+    Frames(ProcessError),
+    /// Fewer frames than a calibration needs show the target.
+    #[error(
+        "{frames} frames show the target, and a calibration needs {needed}: take some at other poses of the camera"
+    )]
+    TooFew {
+        /// Frames there are.
+        frames: usize,
+        /// Frames that are needed.
+        needed: usize,
+    },
+    /// No frame shows the four lines.
+    #[error(
+        "none of the {frames} frames shows the four fiducial lines: check the target's sizes and focal_px and distance_m in rig.toml, and look at a frame"
+    )]
+    NoLines {
+        /// Frames that were looked at.
+        frames: usize,
+    },
+    /// All views are alike.
+    #[error(
+        "all frames that show the target are of one direction of view (within {apart_deg:.0} degrees): take some at views {needed_deg:.0} degrees apart and more, and at other azimuths"
+    )]
+    OneDirection {
+        /// How far views are apart, degrees.
+        apart_deg: f64,
+        /// How far they must be.
+        needed_deg: f64,
+    },
+    /// Frames contradict each other.
+    #[error(
+        "the lines of {misfits} of {frames} frames do not fit the camera that the others fit (frame {frame} by {misfit_px:.1} pixels): frames of two rigs, or a rig that was moved; calibrate each part by itself"
+    )]
+    TwoRigs {
+        /// Frames that do not fit.
+        misfits: usize,
+        /// All that show the target.
+        frames: usize,
+        /// The first that does not fit.
+        frame: u32,
+        /// By how much, pixels.
+        misfit_px: f64,
+    },
+    /// The equations have no solution.
+    #[error(
+        "no rig near rig.toml's fits the frames: check its distances, the target's sizes and the poses in frames.csv"
+    )]
+    NoSolution,
+    /// The caller has ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

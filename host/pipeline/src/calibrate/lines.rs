@@ -1,0 +1,95 @@
+//! What the fiducial lines show, as a function of camera, camera arm and target.
+
+use crate::calibrate::solve::Frames;
+use crate::calibrate::unknowns::{CAMERA, with_values};
+use gonia_brdf::Direction;
+use gonia_imaging::LinePoint;
+use gonia_rig::{CameraModel, CameraShift, FrameRow, Rig};
+
+/// Standard deviations of a frame's own numbers: the camera arm's θ and φ (degrees: what encoders keep) and
+/// each line's own place (pixels: what the model of its brightness leaves).
+pub const OWN: [f64; 6] = [0.03, 0.03, 0.05, 0.05, 0.05, 0.05];
+
+/// A residual of a point that the camera cannot see, standard deviations: as good as none.
+const NOWHERE: f64 = 1e6;
+
+/// Pieces of lines in one frame.
+#[derive(Clone, Debug)]
+pub struct LineFrame {
+    /// The frame.
+    pub row: FrameRow,
+    /// What its lines show.
+    pub points: Vec<LinePoint>,
+}
+
+/// Pieces of lines in frames of a rig.
+pub struct Lines<'a> {
+    /// The rig whose numbers are replaced.
+    pub rig: &'a Rig,
+    /// At least one frame.
+    pub frames: &'a [LineFrame],
+}
+
+impl Frames for Lines<'_> {
+    type At = CameraModel;
+
+    fn count(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn at(&self, shared: &[f64]) -> CameraModel {
+        CameraModel::new(&with_values(&CAMERA, self.rig, shared))
+    }
+
+    fn residuals(&self, camera: &CameraModel, frame: usize, own: &[f64]) -> Vec<f64> {
+        let frame = &self.frames[frame];
+        let a = self.rig.target.line_offset_mm;
+        let by = CameraShift {
+            theta: own[0].to_radians(),
+            phi: own[1].to_radians(),
+            ..CameraShift::default()
+        };
+        let off = distances_px(camera, a, frame.row.pose.view, by, &frame.points);
+        let of_point = |(point, off): (&LinePoint, f64)| {
+            let line = 2 * point.axis + usize::from(point.sign > 0.0);
+            let residual = (off - own[2 + line]) / point.u_px;
+            if residual.is_finite() {
+                residual.clamp(-NOWHERE, NOWHERE)
+            } else {
+                NOWHERE
+            }
+        };
+        frame.points.iter().zip(off).map(of_point).collect()
+    }
+}
+
+/// How far outwards of the lines of a camera's prediction the points are, pixels.
+fn distances_px(
+    camera: &CameraModel,
+    line_offset_mm: f64,
+    view: Direction,
+    by: CameraShift,
+    points: &[LinePoint],
+) -> Vec<f64> {
+    let target_from_pixel = camera.predict(view, by).inverse();
+    points
+        .iter()
+        .map(|point| match &target_from_pixel {
+            Some(map) => {
+                let at = map.apply(camera.undistort(point.pixel))[point.axis];
+                (point.sign * at - line_offset_mm) * point.px_per_mm
+            }
+            None => f64::NAN,
+        })
+        .collect()
+}
+
+/// RMS distance of a frame's lines from where a rig has them, pixels.
+pub fn misfit_px(rig: &Rig, frame: &LineFrame) -> f64 {
+    let camera = CameraModel::new(rig);
+    let by = CameraShift::default();
+    let a = rig.target.line_offset_mm;
+    let off = distances_px(&camera, a, frame.row.pose.view, by, &frame.points);
+    let sum: f64 = off.iter().map(|off| off * off).sum();
+    (sum / off.len().max(1) as f64).sqrt()
+}

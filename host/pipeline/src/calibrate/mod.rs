@@ -1,0 +1,501 @@
+//! A rig's geometry from its own frames.
+//!
+//! 1. The four lines are found in a few frames, from far off, and one least squares makes a first camera.
+//! 2. With it they are found in more frames, more closely.
+//! 3. With that, in all chosen frames to hundredths of a pixel. Camera, camera arm and target follow from
+//!    the lines of all frames together; values of the reference's grid points are read.
+//! 4. The light and its arm follow from the shading on the reference. Lines say where the target is;
+//!    shading takes that from them, with its uncertainty, and does not change it: a reference that is not
+//!    quite what it is thought to be then spoils no camera.
+//!
+//! All of it is weighted least squares with priors ([`solve`]); which numbers may move, and how far, is
+//! said in [`unknowns`].
+
+mod choose;
+mod error;
+mod light;
+mod lines;
+mod numbers;
+mod shading;
+mod solve;
+mod unknowns;
+
+pub use error::CalibrateError;
+pub use light::LightState;
+pub use numbers::{Number, NumberState, Spread};
+
+use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
+use crate::progress::{Cancelled, Progress, Step, step};
+use choose::{chosen, spread};
+use gonia_brdf::Pose;
+use gonia_brdf::direction::angle_between;
+use gonia_formats::checksum;
+use gonia_imaging::{Registrar, SamplingGrid, Search};
+use gonia_rig::{Calibration, Remark, Rig};
+use light::Light;
+use lines::{LineFrame, Lines, misfit_px};
+use nalgebra::DMatrix;
+use numbers::{changes, direction_u, state_of};
+use rayon::prelude::*;
+use shading::ShadedFrame;
+use solve::{Problem, Solved, solve};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use unknowns::{CAMERA, LIGHT, Unknown, values, with_values};
+
+/// Frames in which lines are first looked for from far off, and how many of them must show any.
+const FIRST: usize = 16;
+const ENOUGH_FIRST: usize = 10;
+/// Frames in which they are looked for with the first camera.
+const SECOND: usize = 48;
+/// A calibration needs this many frames that show the target.
+const FEWEST: usize = 6;
+/// Views must differ by this much, degrees.
+const APART_DEG: f64 = 15.0;
+/// A frame whose lines are further from the found camera than this many times the median frame's, and than
+/// this share of the frame's width, is not of this rig.
+const MISFIT_TIMES: f64 = 6.0;
+const MISFIT_WIDTHS: f64 = 1e-3;
+/// Frames of the first steps, whose camera is not known well yet: this share of the width.
+const FIRST_MISFIT_WIDTHS: f64 = 8e-3;
+/// More than this share of frames that do not fit are another rig's.
+const MISFITS: f64 = 0.15;
+
+/// A calibrated rig, and what speaks for it.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// The rig with its numbers as found, and with its `calibration`, whose date is empty: the caller
+    /// knows the time.
+    pub rig: Rig,
+    /// Every number that was looked for.
+    pub numbers: Vec<Number>,
+    /// Frames that were looked at, and that showed the target.
+    pub frames: [usize; 2],
+    /// RMS distance of fiducial lines from where the rig has them, before and after, pixels: the median
+    /// frame's.
+    pub lines_px: [f64; 2],
+    /// What became of the light.
+    pub light: LightState,
+    /// By how much directions of light and view changed, degrees, over the frames.
+    pub changes: [Spread; 2],
+    /// Their standard uncertainties now, degrees.
+    pub direction_u: [Spread; 2],
+    /// Standard deviation of the camera arm's θ and φ from frame to frame, degrees.
+    pub camera_arm_deg: [f64; 2],
+    /// What is to be said of frames.
+    pub remarks: Vec<Remark>,
+}
+
+/// Finds a rig's geometry from frames of the target at many poses, and the light's from those of the
+/// reference. Priors lie about the rig's own numbers: a calibrated rig can be calibrated again.
+///
+/// # Errors
+/// No frame can be read, too few show the target, all are of one direction, or they are of two rigs.
+pub fn calibrate(
+    rig: &Rig,
+    source: &dyn FrameSource,
+    progress: &Progress<'_>,
+) -> Result<Calibrated, CalibrateError> {
+    let rows = chosen(source.rows());
+    if rows.len() < FEWEST {
+        return Err(CalibrateError::TooFew {
+            frames: rows.len(),
+            needed: FEWEST,
+        });
+    }
+    let seen = step(progress, Step::FindingLines, |tell| {
+        let look = Look::new(rig, source, rows.len() + SECOND + FIRST, tell);
+        find_lines(rig, &rows, &look)
+    })?;
+    step(progress, Step::SolvingGeometry, |_| {
+        conclude(rig, rows.len(), seen)
+    })
+}
+
+/// What all chosen frames show.
+struct Seen {
+    lines: Vec<LineFrame>,
+    shaded: Vec<ShadedFrame>,
+    /// The camera that they were found with.
+    rig: Rig,
+    checksum: String,
+    remarks: Vec<Remark>,
+}
+
+/// Looks at frames one by one, in parallel, and says how many are done.
+struct Look<'a> {
+    rig: &'a Rig,
+    source: &'a dyn FrameSource,
+    total: usize,
+    done: AtomicUsize,
+    tell: &'a gonia_brdf::progress::Progress<'a>,
+}
+
+/// What became of each frame, in order; an error where it cannot be read.
+type Looked<T> = Vec<Result<T, crate::process::ProcessError>>;
+
+impl<'a> Look<'a> {
+    fn new(
+        rig: &'a Rig,
+        source: &'a dyn FrameSource,
+        total: usize,
+        tell: &'a gonia_brdf::progress::Progress<'a>,
+    ) -> Self {
+        Self {
+            rig,
+            source,
+            total,
+            done: AtomicUsize::new(0),
+            tell,
+        }
+    }
+
+    fn each<T: Send>(
+        &self,
+        rows: &[FrameRow],
+        work: impl Fn(&FrameRow, &gonia_rig::Frame) -> T + Sync,
+    ) -> Result<Looked<T>, CalibrateError> {
+        let one = |row: &FrameRow| {
+            let done = 1 + self.done.fetch_add(1, Ordering::Relaxed);
+            if (self.tell)(done as f64 / self.total as f64) == ControlFlow::Break(()) {
+                return Err(Cancelled);
+            }
+            Ok(load(self.rig, self.source, row).map(|(frame, _)| work(row, &frame)))
+        };
+        let all: Vec<Result<_, Cancelled>> = rows.par_iter().map(one).collect();
+        Ok(all.into_iter().collect::<Result<Looked<T>, Cancelled>>()?)
+    }
+
+    /// Lines of frames, those without any left out.
+    fn lines(
+        &self,
+        rig: &Rig,
+        rows: &[FrameRow],
+        searches: &[Search],
+    ) -> Result<Vec<LineFrame>, CalibrateError> {
+        let registrar = Registrar::new(rig);
+        let looked = self.each(rows, |row, frame| {
+            let found = searches
+                .iter()
+                .map(|search| registrar.line_points(frame, row.pose.view, *search))
+                .find(|points| !points.is_empty());
+            found.map(|points| LineFrame {
+                row: row.clone(),
+                points,
+            })
+        })?;
+        Ok(looked.into_iter().flatten().flatten().collect())
+    }
+}
+
+fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, CalibrateError> {
+    // From far off, frames from above are the plainest; where they are few, the others have to do.
+    let mut order = spread(rows, FIRST);
+    let rest: Vec<FrameRow> = rows
+        .iter()
+        .filter(|r| !order.contains(r))
+        .cloned()
+        .collect();
+    let mut first = look.lines(rig, &order, &[Search::Far, Search::About])?;
+    for some in rest.chunks(FIRST) {
+        if first.len() >= ENOUGH_FIRST {
+            break;
+        }
+        first.extend(look.lines(rig, some, &[Search::Far, Search::About])?);
+        order.extend_from_slice(some);
+    }
+    let mut camera = rig.clone();
+    if !first.is_empty() {
+        camera = first_camera(rig, &mut first)?;
+        let mut second = look.lines(&camera, &spread(rows, SECOND), &[Search::About])?;
+        if !second.is_empty() {
+            camera = first_camera(rig, &mut second)?;
+        }
+    }
+    let registrar = Registrar::new(&camera);
+    let (sampler, grid) = (FrameSampler::new(&camera), SamplingGrid::new(&camera));
+    let looked = look.each(rows, |row, frame| {
+        let points = registrar.line_points(frame, row.pose.view, Search::Near);
+        let sampled = (row.role == Role::Reference && !points.is_empty())
+            .then(|| sampler.sample(frame, row, Hidden::Find))
+            .filter(|sampled| sampled.report.outcome == Outcome::Locked);
+        let shaded = sampled.and_then(|sampled| ShadedFrame::new(&camera, &grid, &sampled));
+        let lines = LineFrame {
+            row: row.clone(),
+            points,
+        };
+        (lines, shaded, checksum::of_frame(frame))
+    })?;
+    gather(looked, camera)
+}
+
+fn gather(
+    looked: Looked<(LineFrame, Option<ShadedFrame>, String)>,
+    camera: Rig,
+) -> Result<Seen, CalibrateError> {
+    let (total, mut lost, mut first_error) = (looked.len(), 0, None);
+    let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
+    for one in looked {
+        match one {
+            Ok((frame, values, sum)) => {
+                sums.push_str(&sum);
+                if !frame.points.is_empty() {
+                    lines.push(frame);
+                }
+                shaded.extend(values);
+            }
+            Err(error) => {
+                lost += 1;
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    let remarks = match first_error {
+        Some(error) if lost == total => return Err(CalibrateError::Frames(error)),
+        Some(error) => vec![Remark::new(
+            format_args!("{lost} of {total} frames"),
+            format_args!("they cannot be used (the first: {error})"),
+            "the calibration stands on the others",
+        )],
+        None => Vec::new(),
+    };
+    Ok(Seen {
+        lines,
+        shaded,
+        rig: camera,
+        checksum: checksum::of_bytes(sums.as_bytes()),
+        remarks,
+    })
+}
+
+/// The camera that fits lines that were found from far off; frames that it does not fit are left out.
+fn first_camera(rig: &Rig, frames: &mut Vec<LineFrame>) -> Result<Rig, CalibrateError> {
+    let free = [true; CAMERA.len()];
+    let solved = solve_camera(rig, frames, &free, false)?;
+    let camera = with_values(&CAMERA, rig, &solved.shared);
+    let before = frames.len();
+    frames.retain(|frame| fits(&camera, frame, FIRST_MISFIT_WIDTHS));
+    if frames.len() == before || frames.is_empty() {
+        return Ok(camera);
+    }
+    let solved = solve_camera(rig, frames, &free, false)?;
+    Ok(with_values(&CAMERA, rig, &solved.shared))
+}
+
+fn fits(camera: &Rig, frame: &LineFrame, widths: f64) -> bool {
+    misfit_px(camera, frame) <= (widths * camera.camera.width_px as f64).max(0.5)
+}
+
+fn priors(unknowns: &[Unknown], rig: &Rig) -> Vec<f64> {
+    unknowns.iter().map(|u| (u.prior)(rig)).collect()
+}
+
+fn solve_camera(
+    rig: &Rig,
+    frames: &[LineFrame],
+    free: &[bool],
+    finds_noise: bool,
+) -> Result<Solved, CalibrateError> {
+    let nominal = values(&CAMERA, rig);
+    let problem = Problem {
+        nominal: &nominal,
+        prior: &priors(&CAMERA, rig),
+        free,
+        own: &lines::OWN,
+        finds_noise,
+    };
+    solve(&Lines { rig, frames }, &problem, &nominal).ok_or(CalibrateError::NoSolution)
+}
+
+/// The inverse of data's information and the priors', in the numbers' own units.
+fn covariance_of(
+    information: &DMatrix<f64>,
+    prior: &[f64],
+) -> Result<DMatrix<f64>, CalibrateError> {
+    let n = prior.len();
+    // In units of the priors: numbers in pixels stand beside numbers in kilometres.
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        information[(i, j)] * prior[i] * prior[j] + f64::from(u8::from(i == j))
+    });
+    let inverse = scaled
+        .cholesky()
+        .ok_or(CalibrateError::NoSolution)?
+        .inverse();
+    Ok(DMatrix::from_fn(n, n, |i, j| {
+        inverse[(i, j)] * prior[i] * prior[j]
+    }))
+}
+
+/// Which numbers may move once all have, and why the others may not.
+fn states(
+    unknowns: &[Unknown],
+    nominal: &[f64],
+    prior: &[f64],
+    found: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Vec<NumberState> {
+    (0..unknowns.len())
+        .map(|k| {
+            let u = covariance[(k, k)].sqrt();
+            state_of(&unknowns[k], nominal[k], prior[k], found[k], u)
+        })
+        .collect()
+}
+
+fn are_free(states: &[NumberState]) -> Vec<bool> {
+    states.iter().map(|s| *s == NumberState::Found).collect()
+}
+
+fn check_views(looked_at: usize, lines: &[LineFrame]) -> Result<(), CalibrateError> {
+    if lines.is_empty() {
+        return Err(CalibrateError::NoLines { frames: looked_at });
+    }
+    if lines.len() < FEWEST {
+        return Err(CalibrateError::TooFew {
+            frames: lines.len(),
+            needed: FEWEST,
+        });
+    }
+    let one = lines[0].row.pose.view.to_vec3();
+    let furthest = lines
+        .iter()
+        .map(|frame| angle_between(one, frame.row.pose.view.to_vec3()).to_degrees())
+        .fold(0.0, f64::max);
+    if furthest < APART_DEG {
+        return Err(CalibrateError::OneDirection {
+            apart_deg: furthest,
+            needed_deg: APART_DEG,
+        });
+    }
+    Ok(())
+}
+
+/// Leaves out frames that do not fit the camera that most fit.
+fn keep_fitting(rig: &Rig, lines: &mut Vec<LineFrame>) -> Result<(), CalibrateError> {
+    let solved = solve_camera(rig, lines, &[true; CAMERA.len()], true)?;
+    let camera = with_values(&CAMERA, rig, &solved.shared);
+    let misfits: Vec<f64> = lines
+        .iter()
+        .map(|frame| misfit_px(&camera, frame))
+        .collect();
+    let mut sorted = misfits.clone();
+    sorted.sort_by(f64::total_cmp);
+    let floor = (MISFIT_WIDTHS * rig.camera.width_px as f64).max(0.3);
+    let limit = floor.max(MISFIT_TIMES * sorted[sorted.len() / 2]);
+    let total = lines.len();
+    let odd = misfits
+        .iter()
+        .position(|m| *m > limit)
+        .map(|i| (lines[i].row.frame, misfits[i]));
+    let mut i = 0;
+    lines.retain(|_| {
+        i += 1;
+        misfits[i - 1] <= limit
+    });
+    match odd {
+        Some((frame, misfit_px)) if (total - lines.len()) as f64 > MISFITS * total as f64 => {
+            Err(CalibrateError::TwoRigs {
+                misfits: total - lines.len(),
+                frames: total,
+                frame,
+                misfit_px,
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, CalibrateError> {
+    let mut lines = seen.lines;
+    check_views(looked_at, &lines)?;
+    keep_fitting(rig, &mut lines)?;
+    check_views(looked_at, &lines)?;
+    let nominal = values(&CAMERA, rig);
+    let prior = priors(&CAMERA, rig);
+    let all = solve_camera(rig, &lines, &[true; CAMERA.len()], true)?;
+    let covariance = covariance_of(&all.information, &prior)?;
+    let camera_states = states(&CAMERA, &nominal, &prior, &all.shared, &covariance);
+    let camera = solve_camera(rig, &lines, &are_free(&camera_states), true)?;
+    let with_camera = with_values(&CAMERA, rig, &camera.shared);
+    let light = Light::find(&with_camera, seen.shaded, &covariance)?;
+    let found = light.rig(&with_camera);
+
+    let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
+    let mut numbers = table(
+        &CAMERA,
+        &nominal,
+        &camera.shared,
+        &prior,
+        &covariance,
+        &camera_states,
+    );
+    let (mut unknowns, mut shared, mut covariance) =
+        (vec![&CAMERA[..]], camera.shared.clone(), covariance);
+    if let Some(light) = light.solution() {
+        let prior = priors(&LIGHT, rig);
+        let own = light
+            .covariance
+            .view((CAMERA.len(), CAMERA.len()), (LIGHT.len(), LIGHT.len()));
+        let own = own.into_owned();
+        let nominal = values(&LIGHT, rig);
+        numbers.extend(table(
+            &LIGHT,
+            &nominal,
+            &light.shared,
+            &prior,
+            &own,
+            &light.states,
+        ));
+        unknowns.push(&LIGHT[..]);
+        shared.extend_from_slice(&light.shared);
+        covariance = light.covariance.clone();
+    }
+    let direction_u = direction_u(rig, &unknowns, &shared, &covariance, &poses);
+    let median = |rig: &Rig| Spread::of(lines.iter().map(|f| misfit_px(rig, f)).collect()).p50;
+    let calibration = Calibration {
+        date: String::new(),
+        frames: lines.len(),
+        checksum: seen.checksum,
+        names: numbers.iter().map(|n| n.name.to_owned()).collect(),
+        values: shared,
+        u: numbers.iter().map(|n| n.u).collect(),
+        covariance: covariance
+            .row_iter()
+            .map(|r| r.iter().copied().collect())
+            .collect(),
+    };
+    Ok(Calibrated {
+        frames: [looked_at, lines.len()],
+        lines_px: [median(rig), median(&found)],
+        changes: changes(rig, &found, &poses),
+        direction_u,
+        light: light.state(),
+        camera_arm_deg: [camera.own[0], camera.own[1]],
+        remarks: seen.remarks,
+        numbers,
+        rig: Rig {
+            calibration: Some(calibration),
+            ..found
+        },
+    })
+}
+
+fn table(
+    unknowns: &[Unknown],
+    nominal: &[f64],
+    found: &[f64],
+    prior: &[f64],
+    covariance: &DMatrix<f64>,
+    states: &[NumberState],
+) -> Vec<Number> {
+    (0..unknowns.len())
+        .map(|k| Number {
+            name: unknowns[k].name,
+            nominal: nominal[k],
+            found: found[k],
+            u: covariance[(k, k)].sqrt(),
+            prior: prior[k],
+            state: states[k],
+        })
+        .collect()
+}

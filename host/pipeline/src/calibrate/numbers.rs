@@ -1,0 +1,167 @@
+//! What became of each number, and what all of them together mean for directions.
+
+use crate::calibrate::unknowns::{Moves, Unknown, with_values};
+use gonia_brdf::Pose;
+use gonia_brdf::direction::{Vec3, angle_between};
+use gonia_rig::{CameraModel, CameraShift, Rig};
+use nalgebra::{DMatrix, DVector};
+
+/// A number whose uncertainty stays above this share of its prior's is not determined.
+const DETERMINED: f64 = 0.5;
+/// Step of numeric derivatives, in standard uncertainties.
+const STEP: f64 = 0.05;
+
+/// A number of the rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Number {
+    /// Its key in `rig.toml`.
+    pub name: &'static str,
+    /// The value before.
+    pub nominal: f64,
+    /// The value now.
+    pub found: f64,
+    /// Its standard uncertainty.
+    pub u: f64,
+    /// Standard deviation of what was thought possible about the value before.
+    pub prior: f64,
+    /// Why it has the value that it has.
+    pub state: NumberState,
+}
+
+/// Why a number has its value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NumberState {
+    /// The frames determine it.
+    Found,
+    /// The frames tell hardly more than was known: it keeps its value.
+    Undetermined,
+    /// The frames would tell, and speak for its value as it was.
+    NotNeeded,
+}
+
+impl Number {
+    /// How well it is determined: the share of the prior's uncertainty that the frames took away.
+    pub fn determined(&self) -> f64 {
+        (1.0 - self.u / self.prior).max(0.0)
+    }
+}
+
+/// What becomes of a number that was free to move to `value` with uncertainty `u`.
+pub fn state_of(unknown: &Unknown, nominal: f64, prior: f64, value: f64, u: f64) -> NumberState {
+    if u > DETERMINED * prior {
+        return NumberState::Undetermined;
+    }
+    // The Savage-Dickey ratio: twice the logarithm of the Bayes factor for a number that differs from
+    // the rig's against one that does not.
+    let speaks =
+        ((value - nominal) / u).powi(2) - 2.0 * gonia_brdf::Elementary::natural_log(prior / u);
+    match unknown.moves {
+        Moves::WhenNeeded if speaks < 0.0 => NumberState::NotNeeded,
+        _ => NumberState::Found,
+    }
+}
+
+/// Unit vectors towards light and camera, as an arm's reading and a rig have them.
+pub fn directions(rig: &Rig, pose: Pose) -> [Vec3; 2] {
+    let camera = CameraModel::new(rig).placement(pose.view, CameraShift::default());
+    [
+        rig.light_at(pose.light).direction_from([0.0; 2]),
+        camera.direction_from([0.0; 2]),
+    ]
+}
+
+/// An angle over the poses, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// Median.
+    pub p50: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of some angles, degrees; zero of none.
+    pub fn of(mut degrees: Vec<f64>) -> Self {
+        degrees.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let last = degrees.len().checked_sub(1)?;
+            degrees.get((share * last as f64).round() as usize).copied()
+        };
+        let at = |share| at(share).unwrap_or(0.0);
+        Self {
+            p50: at(0.5),
+            p95: at(0.95),
+            max: at(1.0),
+        }
+    }
+}
+
+/// By how much directions of light and view differ between two rigs.
+pub fn changes(from: &Rig, to: &Rig, poses: &[Pose]) -> [Spread; 2] {
+    [0, 1].map(|i| {
+        let apart =
+            |pose: &Pose| angle_between(directions(from, *pose)[i], directions(to, *pose)[i]);
+        Spread::of(poses.iter().map(|pose| apart(pose).to_degrees()).collect())
+    })
+}
+
+/// Standard uncertainties of directions of light and view (both components together) that follow from those
+/// of the numbers.
+pub fn direction_u(
+    rig: &Rig,
+    unknowns: &[&'static [Unknown]],
+    values: &[f64],
+    covariance: &DMatrix<f64>,
+    poses: &[Pose],
+) -> [Spread; 2] {
+    let rig_with = |values: &[f64]| {
+        let mut rig = rig.clone();
+        let mut rest = values;
+        for some in unknowns {
+            let (these, after) = rest.split_at(some.len());
+            rig = with_values(some, &rig, these);
+            rest = after;
+        }
+        rig
+    };
+    let here = rig_with(values);
+    let steps: Vec<f64> = covariance
+        .diagonal()
+        .iter()
+        .map(|v| STEP * v.sqrt())
+        .collect();
+    let beside: Vec<Option<Rig>> = steps
+        .iter()
+        .enumerate()
+        .map(|(k, step)| {
+            (*step > 0.0).then(|| {
+                let mut moved = values.to_vec();
+                moved[k] += step;
+                rig_with(&moved)
+            })
+        })
+        .collect();
+    let u = |pose: &Pose| {
+        let at = directions(&here, *pose);
+        let moved: Vec<Option<[Vec3; 2]>> = beside
+            .iter()
+            .map(|rig| rig.as_ref().map(|rig| directions(rig, *pose)))
+            .collect();
+        [0, 1].map(|i| {
+            let variance: f64 = (0..3)
+                .map(|axis| {
+                    let gradient = DVector::from_fn(values.len(), |k, _| match &moved[k] {
+                        Some(to) => (to[i][axis] - at[i][axis]) / steps[k],
+                        None => 0.0,
+                    });
+                    (gradient.transpose() * covariance * &gradient)[0]
+                })
+                .sum();
+            variance.max(0.0).sqrt().to_degrees()
+        })
+    };
+    let all: Vec<[f64; 2]> = poses.iter().map(u).collect();
+    [0, 1].map(|i| Spread::of(all.iter().map(|u| u[i]).collect()))
+}
