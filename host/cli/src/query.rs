@@ -1,10 +1,14 @@
 //! `gonia query`: values at any directions.
 
+use crate::say::errln;
+use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
 use anyhow::{Context, Result, bail};
 use csv::StringRecord;
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
+use gonia_formats::samples::read_samples;
+use gonia_pipeline::fit_of_samples;
 use gonia_rig::Remark;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
@@ -13,23 +17,103 @@ use std::path::PathBuf;
 const ANGLES: [&str; 4] = ["theta_i", "phi_i", "theta_v", "phi_v"];
 
 /// Reads directions from standard input (CSV with the columns theta_i, phi_i, theta_v, phi_v, in
-/// degrees) and writes them with r, g, b, interpolated between the nodes.
+/// degrees) and writes them with r, g, b: of a dense BRDF interpolated between the nodes, of samples as
+/// a fit to them has it at the very directions.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
+    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nOf samples (.npy, .npz, .csv, .txt, .tsv; at most a million) no grid comes in between: a peak that is narrower than\na grid's step is kept. What symmetry was taken of them is printed on standard error.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
 )]
 pub struct Query {
-    /// The dense BRDF
+    /// The dense BRDF, or the samples themselves
     dense: PathBuf,
+    /// Of samples: the material's symmetry about its normal
+    #[arg(long, value_enum, default_value = "auto")]
+    symmetry: SymmetryArgument,
 }
+
+/// Endings of samples; what else there is, is a dense BRDF.
+const SAMPLES: [&str; 5] = ["npy", "npz", "csv", "txt", "tsv"];
 
 impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        let ending = self.dense.extension().and_then(|e| e.to_str());
+        let is_samples = ending.is_some_and(|e| SAMPLES.iter().any(|s| e.eq_ignore_ascii_case(s)));
+        if is_samples {
+            self.ask_samples()
+        } else {
+            self.ask_dense()
+        }
+    }
+
+    fn ask_dense(self) -> Result<()> {
         let mut brdf = DenseLookup::open(&self.dense)?;
+        let mut input = Directions::of(std::io::stdin().lock())?;
+        let mut beyond = Beyond::of(brdf.grid());
+        let mut out = BufWriter::new(std::io::stdout().lock());
+        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
+        while let Some((angles, line)) = input.next()? {
+            if said.is_err() {
+                break;
+            }
+            beyond.count(angles, line);
+            let (light, view) = pair_of(angles);
+            said = row(&mut out, angles, brdf.lookup(light, view)?);
+        }
+        say::written(said.and_then(|()| out.flush()))?;
+        remarks::print(beyond.remark().as_slice());
+        Ok(())
+    }
+
+    fn ask_samples(self) -> Result<()> {
+        let read = read_samples(&self.dense)?;
+        remarks::print(&read.remarks);
+        let (fit, said_of_it) = fit_of_samples(read.samples, self.symmetry.into())
+            .with_context(|| self.dense.display().to_string())?;
+        remarks::print(&said_of_it);
+        let choice = fit.choice();
+        errln!("{} ({})", choice.settings, choice.reason);
+        let mut input = Directions::of(std::io::stdin().lock())?;
+        let mut asked = Vec::new();
+        while let Some((angles, _)) = input.next()? {
+            asked.push(angles);
+        }
+        let pairs: Vec<_> = asked.iter().map(|angles| pair_of(*angles)).collect();
+        let mut out = BufWriter::new(std::io::stdout().lock());
+        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
+        for (angles, (value, _)) in asked.into_iter().zip(fit.at_all(&pairs)) {
+            said = said.and_then(|()| row(&mut out, angles, value.map(|v| v as f32)));
+        }
+        say::written(said.and_then(|()| out.flush()))
+    }
+}
+
+fn pair_of([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> (Direction, Direction) {
+    (
+        Direction::from_deg(theta_i, phi_i),
+        Direction::from_deg(theta_v, phi_v),
+    )
+}
+
+fn row(
+    out: &mut impl Write,
+    [theta_i, phi_i, theta_v, phi_v]: [f64; 4],
+    [r, g, b]: [f32; 3],
+) -> std::io::Result<()> {
+    writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}")
+}
+
+/// The directions that are asked for, row by row.
+struct Directions<R> {
+    input: csv::StringRecordsIntoIter<R>,
+    columns: [usize; 4],
+}
+
+impl<R: std::io::Read> Directions<R> {
+    fn of(input: R) -> Result<Self> {
         let mut input = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .from_reader(std::io::stdin().lock());
+            .from_reader(input);
         let header = input.headers().context("standard input, line 1")?.clone();
         let mut columns = [0; 4];
         for (name, column) in ANGLES.iter().zip(&mut columns) {
@@ -40,27 +124,20 @@ impl Query {
                 )
             })?;
         }
-        let mut beyond = Beyond::of(brdf.grid());
-        let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
-        for record in input.records() {
-            if said.is_err() {
-                break;
-            }
-            let record = record.context("standard input")?;
-            let line = record.position().map_or(0, |p| p.line());
-            let angles = angles_of(&record, &columns, line)?;
-            let [theta_i, phi_i, theta_v, phi_v] = angles;
-            beyond.count(angles, line);
-            let [r, g, b] = brdf.lookup(
-                Direction::from_deg(theta_i, phi_i),
-                Direction::from_deg(theta_v, phi_v),
-            )?;
-            said = writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}");
-        }
-        say::written(said.and_then(|()| out.flush()))?;
-        remarks::print(beyond.remark().as_slice());
-        Ok(())
+        Ok(Self {
+            input: input.into_records(),
+            columns,
+        })
+    }
+
+    /// The four angles of the next row, degrees, and its line.
+    fn next(&mut self) -> Result<Option<([f64; 4], u64)>> {
+        let Some(record) = self.input.next() else {
+            return Ok(None);
+        };
+        let record = record.context("standard input")?;
+        let line = record.position().map_or(0, |p| p.line());
+        Ok(Some((angles_of(&record, &self.columns, line)?, line)))
     }
 }
 
