@@ -2,24 +2,29 @@
 
 use super::data::Datum;
 use super::local::Predicted;
-use super::places::{Places, exchanged};
-use super::{ScatteredKernel, Settings, predict, preferred};
+use super::places::{Near, Places, exchanged};
+use super::{NEIGHBOURS_MOST, ScatteredKernel, Settings, predict_from, preferred};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
 use crate::interpolate::Coordinates;
+use crate::interpolate::coordinates::Pair;
 use crate::symmetry::Symmetry;
 use rayon::prelude::*;
 
 /// Places that are left out and predicted, at most: each alone, or with its frame.
-const TESTS: usize = 300;
+const TESTS: usize = 240;
+/// The same where a weak dependence on the azimuth is looked for.
+const MANY_TESTS: usize = 1500;
 /// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 24;
-/// A residual beyond this counts as this: an outlier must not decide.
+/// A residual beyond this counts as this …
 const RESIDUAL_MAX: f64 = 1.0;
+/// … and in the search for a dependence on the azimuth, beyond so many times the median of all.
+const OUTLIER: f64 = 5.0;
 /// Of two settings the simpler one is taken unless its error is larger by this share …
 const WORSE_SHARE: f64 = 0.02;
 /// … and by so many standard errors of the difference.
-const WORSE_SIGMAS: f64 = 1.0;
+const WORSE_SIGMAS: f64 = 1.5;
 /// A dependence on the azimuth is shown where its size is so many standard errors …
 const SHOWN_SIGMAS: f64 = 4.0;
 /// … of one of so many waves.
@@ -107,7 +112,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
         None if one_azimuth => Reason::Assumed,
         None => Reason::Shown,
     };
-    let tests = Tests::new(data);
+    let tests = Tests::new(data, TESTS);
     if tests.numbers.len() < TESTS_MIN {
         let unasked = if one_azimuth {
             Symmetry::Isotropic
@@ -152,8 +157,26 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
         })
         .map(|settings| tests.trial(settings))
         .collect();
-    let simplest = simplest(&trials, &tests, asked.is_none() && !one_azimuth);
-    let best = tests.tuned(simplest);
+    let usual = trials
+        .iter()
+        .map(Trial::median)
+        .fold(RESIDUAL_MAX, f64::min);
+    let may_depend_on_azimuth = asked.is_none() && !one_azimuth;
+    let mut best = tests.tuned(
+        simplest(&trials, &tests, usual, may_depend_on_azimuth),
+        usual,
+    );
+    if may_depend_on_azimuth && best.settings.symmetry.is_isotropic() {
+        // A weak dependence takes more tests, and the settings with the least error of their own.
+        let many = Tests::new(data, MANY_TESTS);
+        if many.shows_azimuth(&many.trial(best.settings)) {
+            let anisotropic: Vec<Trial> = trials
+                .into_iter()
+                .filter(|trial| !trial.settings.symmetry.is_isotropic())
+                .collect();
+            best = tests.tuned(simplest(&anisotropic, &tests, usual, false), usual);
+        }
+    }
     let contradicted_by = asked
         .filter(|symmetry| *symmetry != Symmetry::None)
         .and_then(|_| {
@@ -162,7 +185,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
                 ..best.settings
             };
             let without = tests.trial(settings);
-            (worse(&best, &without)
+            (worse(&best, &without, usual)
                 || best.settings.symmetry.is_isotropic() && tests.shows_azimuth(&best))
             .then_some(without.error)
         });
@@ -176,7 +199,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
 }
 
 /// The first, in order of simplicity, that the data do not contradict.
-fn simplest(trials: &[Trial], tests: &Tests, may_depend_on_azimuth: bool) -> Trial {
+fn simplest(trials: &[Trial], tests: &Tests, usual: f64, may_depend_on_azimuth: bool) -> Trial {
     let sound = |trial: &&Trial| {
         !(may_depend_on_azimuth
             && trial.settings.symmetry.is_isotropic()
@@ -185,12 +208,12 @@ fn simplest(trials: &[Trial], tests: &Tests, may_depend_on_azimuth: bool) -> Tri
     let best = trials
         .iter()
         .filter(sound)
-        .min_by(|a, b| a.level.total_cmp(&b.level));
+        .min_by(|a, b| a.level(usual).total_cmp(&b.level(usual)));
     let first = |best: &Trial| {
         trials
             .iter()
             .filter(sound)
-            .find(|trial| !worse(trial, best))
+            .find(|trial| !worse(trial, best, usual))
             .cloned()
     };
     best.and_then(first).unwrap_or(Trial {
@@ -198,20 +221,19 @@ fn simplest(trials: &[Trial], tests: &Tests, may_depend_on_azimuth: bool) -> Tri
         predictions: Vec::new(),
         residuals: Vec::new(),
         error: f64::INFINITY,
-        level: f64::INFINITY,
     })
 }
 
 /// Whether the first is worse than the second beyond chance.
-fn worse(a: &Trial, b: &Trial) -> bool {
+fn worse(a: &Trial, b: &Trial, usual: f64) -> bool {
     let n = a.residuals.len().min(b.residuals.len()) as f64;
     let differences = || {
         let pairs = a.residuals.iter().zip(&b.residuals);
-        pairs.map(|(a, b)| size(a).sqrt() - size(b).sqrt())
+        pairs.map(|(a, b)| loss(a, usual) - loss(b, usual))
     };
     let mean = differences().sum::<f64>() / n;
     let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / n;
-    mean > WORSE_SHARE * b.level && mean > WORSE_SIGMAS * (variance / n).sqrt()
+    mean > WORSE_SHARE * b.level(usual) && mean > WORSE_SIGMAS * (variance / n).sqrt()
 }
 
 /// Mean over the channels of a residual's size.
@@ -219,10 +241,22 @@ fn size(residual: &[f64; 3]) -> f64 {
     residual.iter().map(|r| r.abs()).sum::<f64>() / 3.0
 }
 
+/// What a residual counts: by its square where it is of the usual size, which noise makes, and by its root where
+/// it is far larger, so that a few places on a peak do not hide what all others say.
+fn loss(residual: &[f64; 3], usual: f64) -> f64 {
+    size(residual).hypotenuse(usual).sqrt() - usual.sqrt()
+}
+
 /// Places that are left out.
 struct Tests<'a> {
     data: &'a [Datum],
     numbers: Vec<usize>,
+}
+
+/// What a test is predicted from: data nearest first around its place, and around the reciprocal one.
+struct Neighbourhood {
+    own: (Pair, Vec<Near>),
+    reciprocal: Option<(Pair, Vec<Near>)>,
 }
 
 /// Settings, and what they predict of the tests.
@@ -233,14 +267,11 @@ struct Trial {
     /// Logarithm of predicted over measured, per channel.
     residuals: Vec<[f64; 3]>,
     error: f64,
-    /// Mean root of the residuals' sizes: what is compared, because few large ones would hide what all the
-    /// others say.
-    level: f64,
 }
 
 impl<'a> Tests<'a> {
-    fn new(data: &'a [Datum]) -> Self {
-        let count = data.len().min(TESTS);
+    fn new(data: &'a [Datum], at_most: usize) -> Self {
+        let count = data.len().min(at_most);
         // Evenly among all, in an order without the period of any scan.
         let numbers = (0..count).map(|k| (k * data.len() + data.len() / 2) / count);
         Self {
@@ -250,24 +281,47 @@ impl<'a> Tests<'a> {
     }
 
     fn trial(&self, settings: Settings) -> Trial {
-        self.trial_at(&Places::new(self.data, &settings), settings)
+        self.trial_at(&self.neighbourhoods(settings), settings)
     }
 
-    fn trial_at(&self, places: &Places, settings: Settings) -> Trial {
-        let data = self.data;
-        let predictions: Vec<Predicted> = self
-            .numbers
+    /// The data around the tests without their own groups, as many as any trial takes: they do not depend on
+    /// the kernel.
+    fn neighbourhoods(&self, settings: Settings) -> Vec<Neighbourhood> {
+        let places = Places::new(self.data, &settings);
+        let around = |test: &Datum, place: Pair| {
+            let keep = |other: u32| self.data[other as usize].group != test.group;
+            (
+                place,
+                places.around(place, NEIGHBOURS_MOST, &settings, keep),
+            )
+        };
+        self.numbers
             .par_iter()
             .map(|number| {
-                let test = &data[*number];
-                let keep = |other: u32| data[other as usize].group != test.group;
+                let test = &self.data[*number];
                 let place = settings.coordinates.pair(test.light, test.view);
-                let here = predict(data, places, &settings, place, keep);
-                if settings.reciprocal_data {
-                    return here;
+                Neighbourhood {
+                    own: around(test, place),
+                    reciprocal: (!settings.reciprocal_data).then(|| around(test, exchanged(place))),
                 }
-                let there = predict(data, places, &settings, exchanged(place), keep);
-                preferred(&here, &there)
+            })
+            .collect()
+    }
+
+    fn trial_at(&self, neighbourhoods: &[Neighbourhood], settings: Settings) -> Trial {
+        let data = self.data;
+        let predicted = |(place, near): &(Pair, Vec<Near>)| {
+            let near = &near[..near.len().min(settings.neighbours)];
+            predict_from(data, near, &settings, *place)
+        };
+        let predictions: Vec<Predicted> = neighbourhoods
+            .par_iter()
+            .map(|here| {
+                let own = predicted(&here.own);
+                match &here.reciprocal {
+                    Some(reciprocal) => preferred(&own, &predicted(reciprocal)),
+                    None => own,
+                }
             })
             .collect();
         let residuals: Vec<[f64; 3]> = predictions
@@ -276,18 +330,16 @@ impl<'a> Tests<'a> {
             .map(|(p, n)| [0, 1, 2].map(|c| residual(p.value[c], data[*n].value[c])))
             .collect();
         let error = residuals.iter().map(size).sum::<f64>() / residuals.len() as f64;
-        let level = residuals.iter().map(|r| size(r).sqrt()).sum::<f64>() / residuals.len() as f64;
         Trial {
             settings,
             predictions,
             residuals,
             error,
-            level,
         }
     }
 
     /// The same symmetry with the coordinates, the kernel and the nugget that predict best.
-    fn tuned(&self, start: Trial) -> Trial {
+    fn tuned(&self, start: Trial, usual: f64) -> Trial {
         let systems = [
             Coordinates::sum_difference(0.5),
             Coordinates {
@@ -297,37 +349,42 @@ impl<'a> Tests<'a> {
             Coordinates::half_difference(0.3),
         ];
         let mut best = start;
-        let places = Places::new(self.data, &best.settings);
+        let mut around = self.neighbourhoods(best.settings);
         for (kernel, nugget) in KERNELS {
             let settings = Settings {
                 kernel,
                 ..best.settings.with_nugget(nugget)
             };
-            self.try_at(&places, settings, &mut best);
+            self.try_at(&around, settings, usual, &mut best);
         }
-        let mut best_places = places;
         for coordinates in systems {
             let settings = Settings {
                 coordinates,
                 ..best.settings
             };
-            let places = Places::new(self.data, &settings);
-            if self.try_at(&places, settings, &mut best) {
-                best_places = places;
+            let others = self.neighbourhoods(settings);
+            if self.try_at(&others, settings, usual, &mut best) {
+                around = others;
             }
         }
         let found = best.settings.nugget;
         for factor in NUGGETS {
             let settings = best.settings.with_nugget(found * factor);
-            self.try_at(&best_places, settings, &mut best);
+            self.try_at(&around, settings, usual, &mut best);
         }
         best
     }
 
     /// Takes settings in place of the best ones where they predict better.
-    fn try_at(&self, places: &Places, settings: Settings, best: &mut Trial) -> bool {
-        let trial = self.trial_at(places, settings);
-        let is_better = trial.level < best.level;
+    fn try_at(
+        &self,
+        around: &[Neighbourhood],
+        settings: Settings,
+        usual: f64,
+        best: &mut Trial,
+    ) -> bool {
+        let trial = self.trial_at(around, settings);
+        let is_better = trial.level(usual) < best.level(usual);
         if is_better {
             *best = trial;
         }
@@ -351,10 +408,12 @@ impl<'a> Tests<'a> {
                 .flatten()
                 .collect()
         };
+        // Few that are far off would hide what all the others say.
+        let cap = OUTLIER * trial.median();
         let residuals: Vec<f64> = trial
             .residuals
             .iter()
-            .map(|r| r.iter().sum::<f64>() / 3.0)
+            .map(|r| (r.iter().sum::<f64>() / 3.0).clamp(-cap, cap))
             .collect();
         let at: Vec<Vec<f64>> = self.numbers.iter().map(|n| waves(&self.data[*n])).collect();
         let count = residuals.len() as f64;
@@ -373,6 +432,21 @@ impl<'a> Tests<'a> {
 }
 
 impl Trial {
+    /// What is compared: see [`loss`].
+    fn level(&self, usual: f64) -> f64 {
+        if self.residuals.is_empty() {
+            return f64::INFINITY;
+        }
+        let sum: f64 = self.residuals.iter().map(|r| loss(r, usual)).sum();
+        sum / self.residuals.len() as f64
+    }
+
+    fn median(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.residuals.iter().map(size).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len() / 2).copied().unwrap_or(RESIDUAL_MAX)
+    }
+
     /// With which 95 % of the residuals lie within 1.96 standard errors, noise included.
     fn factor(&self) -> f64 {
         let mut squares: Vec<f64> = self

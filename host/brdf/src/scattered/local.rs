@@ -100,9 +100,22 @@ impl Local {
             nugget,
         };
         for c in 0..3 {
-            local.load(c, &values(c));
+            let own = values(c);
+            // Of one channel, which stands in all three, the work is done once.
+            if c > 0 && own == values(c - 1) {
+                local.copy(c - 1, c);
+            } else {
+                local.load(c, &own);
+            }
         }
         Some(local)
+    }
+
+    fn copy(&mut self, from: usize, to: usize) {
+        self.weights[to] = self.weights[from].clone();
+        self.mean[to] = self.mean[from];
+        self.signal[to] = self.signal[from];
+        self.limits[to] = self.limits[from];
     }
 
     fn load(&mut self, c: usize, values: &[f64]) {
