@@ -143,6 +143,11 @@ impl Local {
 
     /// The value at a place near the data, aligned as they are.
     pub fn at(&self, place: &Pair) -> Predicted {
+        self.at_with(place, true)
+    }
+
+    /// The same; without its error, which takes most of the time, that is 0.
+    pub fn at_with(&self, place: &Pair, with_error: bool) -> Predicted {
         let mut k: Vec<f64> = self
             .places
             .iter()
@@ -152,10 +157,12 @@ impl Local {
             let sum: f64 = k.iter().zip(&self.weights[c]).map(|(a, b)| a * b).sum();
             (self.mean[c] + sum).clamp(self.limits[c].0, self.limits[c].1)
         });
-        forward(&self.factor, &mut k);
-        let squares: f64 = k.iter().map(|x| x * x).sum();
-        let along: f64 = k.iter().zip(&self.ones).map(|(a, b)| a * b).sum();
-        let unit = (1.0 - squares + (1.0 - along).powi(2) / self.ones2).max(1e-12);
+        // The least value of noise about zero is a share of its error.
+        let unit = if with_error || self.response == Response::Linear {
+            self.unit_variance(&mut k)
+        } else {
+            0.0
+        };
         let mut predicted = Predicted {
             value: fitted,
             relative: [0.0; 3],
@@ -180,6 +187,17 @@ impl Local {
             }
         }
         predicted
+    }
+}
+
+impl Local {
+    /// Kriging variance over that of the process, of the covariances `k` of a place with the data, which are
+    /// spoilt.
+    fn unit_variance(&self, k: &mut [f64]) -> f64 {
+        forward(&self.factor, k);
+        let squares: f64 = k.iter().map(|x| x * x).sum();
+        let along: f64 = k.iter().zip(&self.ones).map(|(a, b)| a * b).sum();
+        (1.0 - squares + (1.0 - along).powi(2) / self.ones2).max(1e-12)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::interpolate::coordinates::Pair;
 use rayon::prelude::*;
 
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
-const SHARED: f64 = 0.4;
+const SHARED: f64 = 0.5;
 /// Quarters of the neighbours of one place that a system of many has.
 const NEIGHBOURS: usize = 6;
 /// Side of the blocks that the table begins with, cells.
@@ -34,7 +34,7 @@ impl ScatteredFit {
     /// [`Turns`](crate::Symmetry::Turns) or [`Isotropic`](crate::Symmetry::Isotropic). Positive, finite, exactly
     /// reciprocal, one value a pole.
     pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
-        let table = Table::new(self, grid);
+        let table = Table::new(self, grid, with_errors);
         let factor = self.choice.error_factor;
         let values = table.spread(|p, c| p.value[c]);
         let errors = with_errors.then(|| table.spread(|p, c| factor * p.relative[c] * p.value[c]));
@@ -43,7 +43,7 @@ impl ScatteredFit {
 }
 
 impl Table {
-    fn new(fit: &ScatteredFit, grid: Grid) -> Self {
+    fn new(fit: &ScatteredFit, grid: Grid, with_errors: bool) -> Self {
         let size = [grid.n_theta(), grid.n_theta(), grid.n_phi()];
         let mut parts = Vec::new();
         for i in (0..size[0]).step_by(BLOCK) {
@@ -55,7 +55,12 @@ impl Table {
                 }
             }
         }
-        let filler = Filler { fit, grid };
+        let filler = Filler {
+            fit,
+            grid,
+            // What contradicts reciprocity is averaged by its errors.
+            with_errors: with_errors || !fit.choice.settings.reciprocal_data,
+        };
         let found: Vec<Vec<(usize, Predicted)>> = parts
             .into_par_iter()
             .with_max_len(1)
@@ -134,6 +139,7 @@ impl Table {
 struct Filler<'a> {
     fit: &'a ScatteredFit,
     grid: Grid,
+    with_errors: bool,
 }
 
 impl Filler<'_> {
@@ -194,7 +200,10 @@ impl Filler<'_> {
                     }
                     let place = self.place([i as f64, v as f64, d as f64]);
                     let place = settings.symmetry.aligned(place, middle);
-                    out.push((Table::cell(self.grid, [i, v, d]), local.at(&place)));
+                    out.push((
+                        Table::cell(self.grid, [i, v, d]),
+                        local.at_with(&place, self.with_errors),
+                    ));
                 }
             }
         }
