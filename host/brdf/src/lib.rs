@@ -29,6 +29,7 @@
 //! | [`direction`], [`hemisphere`] | directions, poses, and the rings that the paper measures from |
 //! | [`grid`], [`sample`], [`bins`] | the lattice of directions; a measured value; the median of those that share a cell |
 //! | [`interpolate`] | the default method: bins → [`DenseBrdf`], cross-validation, error bars, kernels |
+//! | [`scattered`], [`symmetry`] | few samples: a fit in double precision, asked anywhere, with the symmetry that they show |
 //! | [`baselines`] | the paper's method and other known ones, one cell at a time |
 //! | [`dense`] | a BRDF at every pair of directions of a grid |
 //! | [`model`], [`fit`] | analytic models; their parameters, fitted to a table or to bins |
@@ -53,6 +54,8 @@ pub mod progress;
 pub mod quantile;
 pub mod random;
 pub mod sample;
+pub mod scattered;
+pub mod symmetry;
 
 pub use bins::{Bin, Bins};
 pub use dense::DenseBrdf;
@@ -61,3 +64,4 @@ pub use elementary::Elementary;
 pub use grid::Grid;
 pub use model::Brdf;
 pub use sample::Sample;
+pub use symmetry::Symmetry;

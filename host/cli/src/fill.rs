@@ -3,6 +3,7 @@
 use crate::progress::Progress;
 use crate::remarks;
 use crate::scale::{self, ScaleArgument};
+use crate::symmetry::SymmetryArgument;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
@@ -47,6 +48,10 @@ pub struct Fill {
     /// noise; 0 refines all, inf none [default: the preset's, or more where refining would cost too much]
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,
+    /// The material's symmetry about its normal: auto (what few samples show, or leave to be assumed),
+    /// none, isotropic or half-turn
+    #[arg(long, value_enum, default_value = "auto")]
+    symmetry: SymmetryArgument,
     /// default, or a method that works cell by cell: paper, nearest, shepard, mls1, mls2,
     /// rbf-KERNEL (core-hours on the 2-degree grid)
     #[arg(long, value_name = "NAME", default_value = "default")]
@@ -92,6 +97,7 @@ impl Fill {
             nodes: self.nodes,
             tolerance: self.tolerance,
             with_errors: self.error.is_some(),
+            symmetry: self.symmetry.into(),
             ..FillOptions::default()
         };
         let (grid, _) = options.check()?;
@@ -157,6 +163,7 @@ impl Fill {
         remarks::print(&filled.remarks);
         let mut rows = describe(&filled.counts, &filled.settings);
         rows.extend(origins(&filled.origins));
+        rows.insert(4, ("symmetry".into(), filled.symmetry));
         rows.push(albedo(&filled.albedo, filled.dense.scale));
         if let FillMethod::Cellwise(_) = self.method {
             rows.extend([

@@ -31,6 +31,7 @@ mod sample_facts;
 mod say;
 mod scale;
 mod sim_device;
+mod symmetry;
 mod table;
 mod verify;
 

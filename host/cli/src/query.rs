@@ -1,55 +1,110 @@
 //! `gonia query`: values at any directions.
 
+use crate::say::errln;
+use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
 use anyhow::{Context, Result};
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
+use gonia_formats::samples::read_samples;
+use gonia_pipeline::fit_of_samples;
 use gonia_rig::Remark;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Reads directions from standard input (a table with the columns theta_i, phi_i, theta_v, phi_v, in
-/// degrees) and writes them with r, g, b, interpolated between the nodes.
+/// degrees) and writes them with r, g, b: of a dense BRDF interpolated between the nodes, of samples as
+/// a fit to them has it at the very directions.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
+    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nOf samples (.npy, .npz, .csv, .txt, .tsv; at most a million) no grid comes in between: a peak that is narrower than\na grid's step is kept. What symmetry was taken of them is printed on standard error.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
 )]
 pub struct Query {
-    /// The dense BRDF
+    /// The dense BRDF, or the samples themselves
     dense: PathBuf,
+    /// Of samples: the material's symmetry about its normal
+    #[arg(long, value_enum, default_value = "auto")]
+    symmetry: SymmetryArgument,
 }
+
+/// Endings of samples; what else there is, is a dense BRDF.
+const SAMPLES: [&str; 5] = ["npy", "npz", "csv", "txt", "tsv"];
 
 impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        let ending = self.dense.extension().and_then(|e| e.to_str());
+        let is_samples = ending.is_some_and(|e| SAMPLES.iter().any(|s| e.eq_ignore_ascii_case(s)));
+        if is_samples {
+            self.ask_samples()
+        } else {
+            self.ask_dense()
+        }
+    }
+
+    fn ask_dense(self) -> Result<()> {
         let mut brdf = DenseLookup::open(&self.dense)?;
-        let place = Path::new("standard input");
-        let mut bytes = Vec::new();
-        std::io::stdin()
-            .lock()
-            .read_to_end(&mut bytes)
-            .with_context(|| place.display().to_string())?;
-        let rows = read_directions(place, bytes)?;
+        let rows = asked()?;
         let mut beyond = Beyond::of(brdf.grid());
         let mut out = BufWriter::new(std::io::stdout().lock());
         let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
-        for row in rows {
+        for asked in rows {
             if said.is_err() {
                 break;
             }
-            let [theta_i, phi_i, theta_v, phi_v] = row.angles_deg;
-            beyond.count(row);
-            let [r, g, b] = brdf.lookup(
-                Direction::from_deg(theta_i, phi_i),
-                Direction::from_deg(theta_v, phi_v),
-            )?;
-            said = writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}");
+            beyond.count(asked);
+            let (light, view) = pair_of(asked.angles_deg);
+            said = row(&mut out, asked.angles_deg, brdf.lookup(light, view)?);
         }
         say::written(said.and_then(|()| out.flush()))?;
         remarks::print(beyond.remark().as_slice());
         Ok(())
     }
+
+    fn ask_samples(self) -> Result<()> {
+        let read = read_samples(&self.dense)?;
+        remarks::print(&read.remarks);
+        let (fit, said_of_it) = fit_of_samples(read.samples, self.symmetry.into())
+            .with_context(|| self.dense.display().to_string())?;
+        remarks::print(&said_of_it);
+        let choice = fit.choice();
+        errln!("{} ({})", choice.settings, choice.reason);
+        let rows = asked()?;
+        let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
+        let mut out = BufWriter::new(std::io::stdout().lock());
+        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
+        for (asked, (value, _)) in rows.into_iter().zip(fit.at_all(&pairs)) {
+            said = said.and_then(|()| row(&mut out, asked.angles_deg, value.map(|v| v as f32)));
+        }
+        say::written(said.and_then(|()| out.flush()))
+    }
+}
+
+/// The directions on standard input.
+fn asked() -> Result<Vec<DirectionRow>> {
+    let place = Path::new("standard input");
+    let mut bytes = Vec::new();
+    std::io::stdin()
+        .lock()
+        .read_to_end(&mut bytes)
+        .with_context(|| place.display().to_string())?;
+    Ok(read_directions(place, bytes)?)
+}
+
+fn pair_of([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> (Direction, Direction) {
+    (
+        Direction::from_deg(theta_i, phi_i),
+        Direction::from_deg(theta_v, phi_v),
+    )
+}
+
+fn row(
+    out: &mut impl Write,
+    [theta_i, phi_i, theta_v, phi_v]: [f64; 4],
+    [r, g, b]: [f32; 3],
+) -> std::io::Result<()> {
+    writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}")
 }
 
 /// Directions beyond the grid's last polar angle, which have its value.

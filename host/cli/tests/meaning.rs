@@ -267,6 +267,16 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
             &["one direction of light"],
         ),
         case(
+            "--symmetry isotropic of a material that is not",
+            &changed(&good, |_, row| {
+                let azimuths = (row[1] + row[3]).to_radians();
+                row[4] *= 1.0 + 0.4 * azimuths.cosine();
+            }),
+            &["--symmetry", "isotropic"],
+            0,
+            &["contradict the symmetry that was asked for, isotropic"],
+        ),
+        case(
             "values of π·f said to be absolute",
             &changed(&good, |_, row| row[4] *= 4.0 * std::f64::consts::PI),
             &["--scale", "absolute"],
@@ -275,4 +285,33 @@ fn samples_that_contradict_what_they_are_taken_for_are_refused_or_remarked_on() 
         ),
     ];
     document("meaning", &cases);
+}
+
+#[test]
+fn samples_are_asked_without_a_grid_and_keep_a_peak_that_a_grid_would_lose() {
+    let dir = tempfile::tempdir().unwrap();
+    let samples = dir.path().join("peak.csv");
+    // A retro-reflector's peak of one degree, one azimuth of light.
+    let value = |theta: f64| 0.1 + 2.0 * (-((theta - 30.3) / 0.5).powi(2)).exponential();
+    let mut csv = String::from("theta_i,phi_i,theta_v,phi_v,brdf\n");
+    for k in 0..600 {
+        let theta = f64::from(k) * 0.1 + 5.0;
+        writeln!(csv, "30,0,{theta},0,{}", value(theta)).unwrap();
+    }
+    fs::write(&samples, csv).unwrap();
+    let asked = "theta_i,phi_i,theta_v,phi_v\n30,0,30.33,0\n30,77,30.33,77\n";
+    let output = gonia(&["query", text(&samples)], asked);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("assumed to be isotropic"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let values: Vec<f64> = printed
+        .lines()
+        .skip(1)
+        .map(|line| line.rsplit(',').next().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(values.len(), 2, "{printed}");
+    for got in values {
+        assert!((got / value(30.33) - 1.0).abs() < 0.05, "{printed}");
+    }
 }

@@ -1,15 +1,16 @@
 //! Samples → bins → dense BRDF.
 
 use crate::Error;
-use crate::doubts::{self, DirectionalAlbedo};
+use crate::doubts::{self, DirectionalAlbedo, Isotropy};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{
-    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillSettings, Matern32, OriginCounts,
-    Preset,
+    self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillError, FillSettings,
+    IsotropicOrigins, Matern32, OriginCounts, Preset,
 };
-use gonia_brdf::{Bin, Bins, DenseBrdf, Grid};
+use gonia_brdf::scattered::{Reason, ScatteredFit, is_few};
+use gonia_brdf::{Bin, Bins, DenseBrdf, Direction, Grid, Sample, Symmetry};
 use gonia_formats::dense::write_dense_by_rows;
 use gonia_rig::{DenseFile, Remark, SampleSet, keep_sound};
 use std::path::Path;
@@ -35,6 +36,9 @@ pub struct FillOptions {
     pub kernel: &'static dyn AnyKernel,
     /// Whether each cell gets a standard error.
     pub with_errors: bool,
+    /// The symmetry of the material about its normal; without it, what few samples show or leave to be assumed,
+    /// and none of many.
+    pub symmetry: Option<Symmetry>,
 }
 
 impl Default for FillOptions {
@@ -49,6 +53,7 @@ impl Default for FillOptions {
             tolerance: None,
             kernel: &Matern32,
             with_errors: false,
+            symmetry: None,
         }
     }
 }
@@ -150,12 +155,22 @@ impl FillOptions {
             "not on a grid of {} degrees, which is filled row by row; leave it out",
             self.step_deg
         );
+        if self.symmetry.is_some_and(Symmetry::is_isotropic) && grid.n_cells() > CELLS_IN_MEMORY {
+            return refuse("--symmetry", "isotropic".into(), by_rows);
+        }
         let is_blocks = self.method == FillMethod::Blocks;
         if self.with_errors && !is_blocks {
             return refuse(
                 "--error",
                 "with --method".into(),
                 "only the default method has error bars; leave out one of them".into(),
+            );
+        }
+        if self.symmetry.is_some_and(|s| s != Symmetry::None) && !is_blocks {
+            return refuse(
+                "--symmetry",
+                "with --method".into(),
+                "only the default method has symmetries; leave out one of them".into(),
             );
         }
         if grid.n_cells() > CELLS_IN_MEMORY && self.with_errors {
@@ -204,6 +219,8 @@ pub struct Filled {
     pub counts: FillCounts,
     /// The method's settings, as chosen for the material, for people.
     pub settings: String,
+    /// The symmetry that the values have, and why, for people.
+    pub symmetry: String,
     /// Where the cells' values come from.
     pub origins: OriginCounts,
     /// The directional albedo, its highest within the measured polar angles.
@@ -240,14 +257,29 @@ pub fn fill(
 ) -> Result<Filled, Error> {
     let (grid, base) = options.check()?;
     let scale = samples.scale;
-    let binned = Binned::new(samples, grid, progress)?;
-    let (brdf, errors, settings, counts) = match options.method {
-        FillMethod::Blocks => {
+    let binned = Binned::new(samples, grid, options, progress)?;
+    let (brdf, errors, settings, counts) = match (options.method, &binned.isotropic) {
+        (FillMethod::Blocks, Some(fit)) => {
+            let (dense, errors) = step(progress, Step::Interpolating, |_| {
+                Ok::<_, Error>(fit.dense(grid, options.with_errors))
+            })?;
+            let errors = errors.map(|standard_error| ErrorBars {
+                standard_error,
+                origin: binned.isotropic_origins(fit).of_cells(),
+            });
+            (
+                dense,
+                errors,
+                fit.choice().settings.to_string(),
+                binned.counts(),
+            )
+        }
+        (FillMethod::Blocks, None) => {
             let blocks = fill_bins(&binned.bins, base, options.with_errors, progress)?;
             let text = blocks.settings.to_string();
             (blocks.dense, blocks.errors, text, binned.counts())
         }
-        FillMethod::Cellwise(settings) => {
+        (FillMethod::Cellwise(settings), _) => {
             let filled = step(progress, Step::Interpolating, |share| {
                 baselines::fill(&binned.bins, &settings, share).map_err(Error::from)
             })?;
@@ -260,18 +292,21 @@ pub fn fill(
         }
     };
     let albedo = DirectionalAlbedo::of(&brdf, binned.highest_deg());
+    let mut provenance = provenance_of(&settings);
+    provenance.insert("symmetry".into(), binned.symmetry.clone());
     let mut remarks = binned.remarks;
     remarks.extend(doubts::remark_on_energy(&albedo, scale));
     Ok(Filled {
         dense: DenseFile {
             brdf,
             scale,
-            provenance: provenance_of(&settings),
+            provenance,
         },
         errors,
         cells: binned.bins.bins().iter().map(|b| b.cell).collect(),
         counts,
         settings,
+        symmetry: binned.symmetry,
         origins: binned.origins,
         albedo,
         remarks,
@@ -292,13 +327,14 @@ pub fn fill_to_file(
 ) -> Result<FilledFile, Error> {
     let (grid, base) = options.check()?;
     let scale = samples.scale;
-    let binned = Binned::new(samples, grid, progress)?;
+    let binned = Binned::new(samples, grid, options, progress)?;
     let known = sorted(&binned.bins, base, progress)?;
     let settings = chosen(&known, base, progress)?;
     let rows = step(progress, Step::FittingBlocks, |share| {
         ByRows::new(&known, &settings, share).map_err(Error::from)
     })?;
     let mut provenance = provenance_of(&settings.to_string());
+    provenance.insert("symmetry".into(), binned.symmetry.clone());
     provenance.extend(facts.clone());
     step(progress, Step::InterpolatingAndWriting, |share| {
         write_dense_by_rows(path, grid, &rows, scale, &provenance, share).map_err(Error::from)
@@ -380,29 +416,78 @@ fn chosen(
 struct Binned {
     bins: Bins,
     samples: usize,
+    /// How many of a sample are in the bins: with its images.
+    images: usize,
+    /// The fit, where the material is isotropic: it takes the place of the bins.
+    isotropic: Option<ScatteredFit>,
+    /// The symmetry, for people and for the provenance.
+    symmetry: String,
     origins: OriginCounts,
     remarks: Vec<Remark>,
 }
 
 impl Binned {
-    fn new(mut samples: SampleSet, grid: Grid, progress: &Progress<'_>) -> Result<Self, Error> {
+    fn new(
+        mut samples: SampleSet,
+        grid: Grid,
+        options: &FillOptions,
+        progress: &Progress<'_>,
+    ) -> Result<Self, Error> {
         let count = samples.samples.len();
         let odd = keep_sound(&mut samples.samples);
         let samples = samples.samples;
         let mut remarks = doubts::of_oddities(&odd);
         remarks.extend(doubts::of_samples(&samples)?);
+        let fit = symmetric_fit(&samples, grid, options, progress)?;
+        let (symmetry, reason) = match (&fit, options.symmetry) {
+            (Some(fit), _) => (fit.choice().settings.symmetry, fit.choice().reason),
+            (None, Some(asked)) => (asked, Reason::Asked),
+            (None, None) => (Symmetry::None, Reason::Untested),
+        };
+        let isotropic = fit.filter(|fit| {
+            let is_isotropic = symmetry.is_isotropic();
+            if is_isotropic || fit.choice().contradicted_by.is_some() {
+                remarks.extend(doubts::remarks_on_symmetry(fit));
+            }
+            is_isotropic
+        });
         let bins = step(progress, Step::Binning, |_| {
             Ok::<_, Error>(Bins::new(grid, &samples))
         })?;
         remarks.extend(doubts::of_bins(&samples, &bins));
-        let origins = OriginCounts::of(&bins);
-        remarks.extend(doubts::remark_on_layout(&samples, &origins));
-        Ok(Self {
+        let isotropy = match (&isotropic, reason) {
+            (None, _) => Isotropy::No,
+            (_, Reason::Asked) => Isotropy::Asked,
+            (_, Reason::Assumed) => Isotropy::Assumed,
+            _ => Isotropy::Shown,
+        };
+        let images = if symmetry == Symmetry::HalfTurn { 2 } else { 1 };
+        let bins = if images > 1 {
+            Bins::new(grid, &symmetry.completed(samples.clone()))
+        } else {
+            bins
+        };
+        let mut binned = Self {
+            origins: OriginCounts::of(&bins),
             bins,
             samples: count,
-            origins,
+            images,
+            isotropic: None,
+            symmetry: format!("{symmetry}, {reason}"),
             remarks,
-        })
+        };
+        if let Some(fit) = isotropic {
+            binned.origins = binned.isotropic_origins(&fit).counts();
+            binned.isotropic = Some(fit);
+        }
+        let layout = doubts::remark_on_layout(&samples, &binned.origins, isotropy);
+        binned.remarks.extend(layout);
+        Ok(binned)
+    }
+
+    fn isotropic_origins(&self, fit: &ScatteredFit) -> IsotropicOrigins {
+        let sides_alike = fit.choice().settings.symmetry == Symmetry::Isotropic;
+        IsotropicOrigins::of(&self.bins, sides_alike)
     }
 
     /// The largest polar angle of light, or by reciprocity of view, that was measured.
@@ -417,7 +502,8 @@ impl Binned {
     }
 
     fn counts(&self) -> FillCounts {
-        let binned: usize = self.bins.bins().iter().map(|bin| bin.count as usize).sum();
+        let in_bins: usize = self.bins.bins().iter().map(|bin| bin.count as usize).sum();
+        let binned = in_bins / self.images;
         FillCounts {
             binned,
             outside: self.samples - binned,
@@ -426,6 +512,78 @@ impl Binned {
             raised: 0,
         }
     }
+}
+
+/// A fit of few samples, or of those of a material that is said to be isotropic; `None` where nothing is to be
+/// found out, or there is too little to fit.
+fn symmetric_fit(
+    samples: &[Sample],
+    grid: Grid,
+    options: &FillOptions,
+    progress: &Progress<'_>,
+) -> Result<Option<ScatteredFit>, Error> {
+    let asked = options.symmetry;
+    let possible = options.method == FillMethod::Blocks && grid.n_cells() <= CELLS_IN_MEMORY;
+    if !possible || asked == Some(Symmetry::None) {
+        return Ok(None);
+    }
+    step(progress, Step::ChoosingSettings, |_| {
+        Ok(if is_few(samples) {
+            ScatteredFit::new(samples, asked)
+        } else if asked.is_some_and(Symmetry::is_isotropic) {
+            ScatteredFit::new(&few_of(samples, grid), asked)
+        } else {
+            None
+        })
+    })
+}
+
+/// More samples than this are not asked without a grid.
+const SAMPLES_AT_MOST: usize = 1_000_000;
+
+/// A fit of samples that is asked at any directions, without a grid, and what is to be said of them.
+///
+/// # Errors
+/// Samples that contradict what they are taken for, or too few or too many of them.
+pub fn fit_of_samples(
+    mut samples: Vec<Sample>,
+    symmetry: Option<Symmetry>,
+) -> Result<(ScatteredFit, Vec<Remark>), Error> {
+    let odd = keep_sound(&mut samples);
+    let mut remarks = doubts::of_oddities(&odd);
+    remarks.extend(doubts::of_samples(&samples)?);
+    if samples.len() > SAMPLES_AT_MOST {
+        return Err(Error::Contradicted {
+            what: format!(
+                "{} samples are more than the {SAMPLES_AT_MOST} that can be asked without a grid",
+                samples.len()
+            ),
+            remedy: "make a dense BRDF of them with gonia fill, and query that".into(),
+        });
+    }
+    let fit = ScatteredFit::new(&samples, symmetry).ok_or(FillError::TooFewBins(samples.len()))?;
+    remarks.extend(doubts::remarks_on_symmetry(&fit));
+    if fit.choice().reason == Reason::Assumed {
+        remarks.push(doubts::remark_on_assumed_isotropy());
+    }
+    Ok((fit, remarks))
+}
+
+/// Of many samples of an isotropic material, the medians of those that share a cell when all are turned to
+/// one azimuth of light.
+fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
+    let turned = samples.iter().map(|s| Sample {
+        phi_i_deg: 0.0,
+        phi_v_deg: (s.phi_v_deg - s.phi_i_deg).rem_euclid(360.0),
+        ..*s
+    });
+    let bins = Bins::new(grid, &turned.collect::<Vec<Sample>>());
+    let bins = bins.bins().iter();
+    bins.map(|bin| {
+        let direction = |v: [f32; 3]| Direction::from_vec3(v.map(f64::from));
+        Sample::new(direction(bin.light), direction(bin.view), bin.median)
+    })
+    .collect()
 }
 
 /// What a filled BRDF says of its making.

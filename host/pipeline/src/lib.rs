@@ -16,6 +16,7 @@
 //! | [`samples_of_folder`], [`samples_of`] | a capture folder, or any [`FrameSource`](process::FrameSource) | samples, and what became of each frame |
 //! | [`calibrate()`] | a capture folder's frames | the rig's geometry, with uncertainties |
 //! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples or bins | a dense BRDF, with standard errors where asked for |
+//! | [`fit_of_samples`] | few samples | a fit that is asked anywhere, without a grid |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
 //! | [`baselines`] | a measurement | other ways to the same BRDF, and how far each is |
@@ -46,7 +47,7 @@ pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
     FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins,
-    fill_to_file,
+    fill_to_file, fit_of_samples,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

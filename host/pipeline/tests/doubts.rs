@@ -5,7 +5,7 @@ use gonia_brdf::Elementary;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::model::{Brdf, Material};
 use gonia_brdf::random::Random;
-use gonia_brdf::{Direction, Sample};
+use gonia_brdf::{Direction, Grid, Sample, Symmetry};
 use gonia_pipeline::{Error, FillOptions, fill, silent};
 use gonia_rig::{SampleSet, Scale};
 
@@ -297,5 +297,80 @@ fn slices_of_the_four_angles_are_named() {
             (None, None) => (),
             _ => panic!("{said:?} for {words:?}"),
         }
+    }
+}
+
+/// A highlight over a Lambertian base; the lobe's height goes with twice the half vector's azimuth by a share.
+fn with_highlight(layout: Layout, share: f64) -> Vec<Sample> {
+    let value = |light: Direction, view: Direction| {
+        let (i, v) = (light.to_vec3(), view.to_vec3());
+        let h = gonia_brdf::direction::normalize([0, 1, 2].map(|k| i[k] + v[k]));
+        let wave = 1.0 + share * (h[0] * h[0] - h[1] * h[1]) / (h[0] * h[0] + h[1] * h[1]);
+        (0.1 + 0.3 * h[2].power(20.0)) * wave
+    };
+    places(layout)
+        .into_iter()
+        .map(|[light, view]| Sample::new(light, view, [value(light, view) as f32; 3]))
+        .collect()
+}
+
+#[test]
+fn one_azimuth_is_assumed_to_be_isotropic_and_the_result_says_so() {
+    let set = |samples: Vec<Sample>| SampleSet {
+        samples,
+        scale: Scale::Relative,
+    };
+    let samples = with_highlight(Layout::OneAzimuth, 0.0);
+    let options = FillOptions {
+        with_errors: true,
+        ..FillOptions::with_step_deg(30.0)
+    };
+    let filled = fill(set(samples.clone()), &options, &silent).unwrap();
+    let said: Vec<String> = filled.remarks.iter().map(ToString::to_string).collect();
+    assert!(
+        said.iter().any(|s| s.contains("assumed to be isotropic")),
+        "{said:?}"
+    );
+    let symmetry = &filled.dense.provenance["symmetry"];
+    assert!(
+        symmetry.contains("isotropic") && symmetry.contains("assumed"),
+        "{symmetry}"
+    );
+    assert!(filled.errors.is_some());
+    // What was measured at 180 degrees holds at 60.
+    let at = |phi: f64| {
+        (
+            Direction::from_deg(30.0, phi),
+            Direction::from_deg(60.0, phi + 150.0),
+        )
+    };
+    let lookup = |(light, view)| f64::from(filled.dense.brdf.lookup(light, view)[1]);
+    assert_eq!(lookup(at(180.0)), lookup(at(60.0)));
+    let n = Grid::with_step_deg(30.0).unwrap().n_cells() as u64;
+    assert!(filled.origins.extrapolated < n / 2);
+
+    let none = FillOptions {
+        symmetry: Some(Symmetry::None),
+        ..FillOptions::with_step_deg(30.0)
+    };
+    let filled = fill(set(samples), &none, &silent).unwrap();
+    let said: Vec<String> = filled.remarks.iter().map(ToString::to_string).collect();
+    assert!(
+        said.iter().any(|s| s.contains("was not measured")),
+        "{said:?}"
+    );
+    assert!(filled.dense.provenance["symmetry"].starts_with("none"));
+}
+
+#[test]
+fn a_symmetry_that_samples_contradict_is_remarked_on_and_one_that_they_show_is_not() {
+    for (share, contradicted) in [(0.0, false), (0.1, true)] {
+        let samples = with_highlight(Layout::Scattered(600), share);
+        let (fit, remarks) =
+            gonia_pipeline::fit_of_samples(samples, Some(Symmetry::Isotropic)).unwrap();
+        assert!(fit.choice().settings.symmetry.is_isotropic());
+        let said: Vec<String> = remarks.iter().map(ToString::to_string).collect();
+        let found = said.iter().any(|s| s.contains("contradict the symmetry"));
+        assert_eq!(found, contradicted, "{share}: {said:?}");
     }
 }

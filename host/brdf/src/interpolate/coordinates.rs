@@ -8,6 +8,8 @@ use crate::elementary::Elementary;
 
 /// A point of the six-dimensional embedding.
 pub type Point = [f32; 6];
+/// A point in double precision, for few data.
+pub type Pair = [f64; 6];
 
 /// A system of coordinates for pairs of directions: `(√2 h |½(i + v)|^p, w (i − v)/√2)` with the unit half vector h.
 ///
@@ -42,17 +44,22 @@ impl Coordinates {
 
     /// The point of a pair of unit vectors.
     pub fn point(&self, light: Vec3, view: Vec3) -> Point {
+        self.pair(light, view).map(|x| x as f32)
+    }
+
+    /// The same in double precision.
+    pub fn pair(&self, light: Vec3, view: Vec3) -> Pair {
         let sum = [light[0] + view[0], light[1] + view[1], light[2] + view[2]];
         let length = crate::direction::dot(sum, sum).sqrt().max(1e-9);
         let scale = std::f64::consts::SQRT_2 / length * self.raised(0.5 * length);
         let w = self.weight * std::f64::consts::FRAC_1_SQRT_2;
         [
-            (sum[0] * scale) as f32,
-            (sum[1] * scale) as f32,
-            (sum[2] * scale) as f32,
-            ((light[0] - view[0]) * w) as f32,
-            ((light[1] - view[1]) * w) as f32,
-            ((light[2] - view[2]) * w) as f32,
+            sum[0] * scale,
+            sum[1] * scale,
+            sum[2] * scale,
+            (light[0] - view[0]) * w,
+            (light[1] - view[1]) * w,
+            (light[2] - view[2]) * w,
         ]
     }
 

@@ -33,7 +33,7 @@ pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};
 pub use fill::{FillError, fill, fill_with_errors};
-pub use origin::{Origin, OriginCounts, origins};
+pub use origin::{IsotropicOrigins, Origin, OriginCounts, origins};
 pub use select::{Candidate, Selection, select};
 
 /// How to interpolate.

@@ -166,6 +166,93 @@ fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
         .collect()
 }
 
+/// Where the values of an isotropic BRDF come from: what is measured at one azimuth is so at all.
+pub struct IsotropicOrigins {
+    grid: Grid,
+    /// By rows of light and of view, and the difference of azimuths: an [`Origin`] each.
+    table: Vec<u8>,
+}
+
+impl IsotropicOrigins {
+    /// Of bins; with `sides_alike`, what is measured on one side of the plane of incidence is so on the other.
+    pub fn of(bins: &Bins, sides_alike: bool) -> Self {
+        let grid = bins.grid();
+        let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
+        let rows = Reach::new(bins).rows;
+        let mut measured = [(); 2].map(|()| vec![false; n_theta]);
+        let mut cells = Vec::new();
+        for bin in bins.bins() {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            let (i, v) = (light / n_phi, view / n_phi);
+            let turn = (view % n_phi + n_phi - light % n_phi) % n_phi;
+            measured[0][i] = true;
+            measured[1][v] = true;
+            cells.push([i, v, turn]);
+            if sides_alike {
+                cells.push([i, v, (n_phi - turn) % n_phi]);
+            }
+        }
+        let gap = (GAP_DEG / grid.step_deg()) as usize;
+        let near = measured.map(|rows| {
+            let near = |row: usize| (0..n_theta).any(|k| rows[k] && k.abs_diff(row) <= gap);
+            (0..n_theta).map(near).collect::<Vec<bool>>()
+        });
+        let mut table = vec![Origin::Extrapolated as u8; n_theta * n_theta * n_phi];
+        for (pair, ring) in table.chunks_mut(n_phi).enumerate() {
+            let (i, v) = (pair / n_theta, pair % n_theta);
+            let no_gap = near[0][i] && near[1][v] || near[0][v] && near[1][i];
+            if no_gap && v < rows[i] {
+                ring.fill(Origin::Interpolated as u8);
+            }
+        }
+        let mut set = |[i, v, turn]: [usize; 3], origin: Origin| {
+            let ring = &mut table[(i * n_theta + v) * n_phi..][..n_phi];
+            if i == 0 || v == 0 {
+                ring.fill(origin as u8);
+            } else {
+                ring[turn] = origin as u8;
+            }
+        };
+        for [i, v, turn] in &cells {
+            set([*v, *i, (n_phi - turn) % n_phi], Origin::Reciprocal);
+        }
+        for cell in &cells {
+            set(*cell, Origin::Measured);
+        }
+        Self { grid, table }
+    }
+
+    /// How many cells have their value from where.
+    pub fn counts(&self) -> OriginCounts {
+        let count = |origin: Origin| {
+            let cells = self.table.iter().filter(|o| **o == origin as u8).count();
+            (cells * self.grid.n_phi()) as u64
+        };
+        OriginCounts {
+            measured: count(Origin::Measured),
+            reciprocal: count(Origin::Reciprocal),
+            interpolated: count(Origin::Interpolated),
+            extrapolated: count(Origin::Extrapolated),
+        }
+    }
+
+    /// An [`Origin`] a cell of the grid.
+    pub fn of_cells(&self) -> Vec<u8> {
+        let (n_theta, n_phi) = (self.grid.n_theta(), self.grid.n_phi());
+        let n = self.grid.n_directions();
+        (0..n)
+            .into_par_iter()
+            .flat_map_iter(|light| {
+                (0..n).map(move |view| {
+                    let (i, v) = (light / n_phi, view / n_phi);
+                    let turn = (view % n_phi + n_phi - light % n_phi) % n_phi;
+                    self.table[(i * n_theta + v) * n_phi + turn]
+                })
+            })
+            .collect()
+    }
+}
+
 /// Where each cell's value comes from, as an [`Origin`] a cell.
 pub fn origins(bins: &Bins) -> Vec<u8> {
     let grid = bins.grid();

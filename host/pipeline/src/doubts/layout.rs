@@ -8,13 +8,30 @@ use gonia_brdf::interpolate::OriginCounts;
 use gonia_rig::Remark;
 use rayon::prelude::*;
 
+/// What a fill takes of a material's isotropy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Isotropy {
+    /// It depends on the azimuth, or no one has looked.
+    No,
+    /// Isotropic, though samples of one azimuth cannot show it.
+    Assumed,
+    /// Isotropic, because it was asked for.
+    Asked,
+    /// Isotropic, as samples of several azimuths agree.
+    Shown,
+}
+
 /// Directions within this are the same, degrees: arms do not stop exactly.
 const SAME_DEG: f32 = 1.0;
 /// Where more cells than this are extrapolated, it is said, whatever the samples look like.
 const MOSTLY: f64 = 0.5;
 
 /// Which slice of the four angles the samples are, and how much of the grid it leaves to guess.
-pub(crate) fn remark(samples: &[Sample], origins: &OriginCounts) -> Option<Remark> {
+pub(crate) fn remark(
+    samples: &[Sample],
+    origins: &OriginCounts,
+    isotropy: Isotropy,
+) -> Option<Remark> {
     let guessed = 100.0 * origins.extrapolated_share();
     let follows = format!("{guessed:.1} % of the cells are extrapolated");
     let say = |what: String, remedy: &str| Some(Remark::new(SAMPLES, what, remedy));
@@ -38,9 +55,13 @@ pub(crate) fn remark(samples: &[Sample], origins: &OriginCounts) -> Option<Remar
         );
     }
     if samples.par_iter().all(in_plane) {
+        let assumed = match isotropy {
+            Isotropy::Assumed => "the material is assumed to be isotropic, ",
+            _ => "",
+        };
         return say(
             format!(
-                "all lie in the plane of incidence: {follows}, and values out of this plane were not measured"
+                "all lie in the plane of incidence: {assumed}{follows}, and values out of this plane were not measured"
             ),
             "measure views out of the plane of incidence; use the result within it only",
         );
@@ -54,6 +75,17 @@ pub(crate) fn remark(samples: &[Sample], origins: &OriginCounts) -> Option<Remar
     ];
     for (arm, azimuth) in three_angles {
         if let Some(azimuth) = azimuth {
+            if isotropy == Isotropy::Assumed {
+                return say(
+                    format!(
+                        "all have one azimuth of {arm}, {azimuth:.0} degrees, as three-angle data of isotropic materials have: the material is assumed to be isotropic, which nothing in them can show or contradict; {follows}"
+                    ),
+                    "if it is not isotropic, measure other azimuths; with --symmetry none these are extrapolated",
+                );
+            }
+            if isotropy == Isotropy::Asked {
+                return None;
+            }
             return say(
                 format!(
                     "all have one azimuth of {arm}, {azimuth:.0} degrees, as three-angle data of isotropic materials have: {follows}, and how values depend on the azimuth was not measured"

@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""Real measurements, a fifth of each held out: gonia's fit, and its grid, against scipy's linear RBF on logarithms.
+
+usage: real_sets.py GONIA FOLDER [STEP]
+
+FOLDER holds tables (.csv) with rows theta_i,phi_i,theta_v,phi_v,value: degrees, 1/sr; other lines are left out.
+Printed, a row a method: RMS, median and 95th percentile of |ln(predicted / held out)|, and user CPU seconds.
+"""
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+HEADER = "theta_i,phi_i,theta_v,phi_v"
+
+
+def read(path):
+    rows = []
+    for line in path.read_text().splitlines():
+        try:
+            rows.append([float(x) for x in line.split(",")[:5]])
+        except ValueError:
+            continue
+    rows = np.array([r for r in rows if len(r) == 5])
+    inside = (rows[:, 0] < 85) & (rows[:, 2] < 85) & (rows[:, 4] > 0)
+    return rows[inside]
+
+
+def vectors(rows):
+    def unit(theta, phi):
+        theta, phi = np.radians(theta), np.radians(phi)
+        return [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+
+    return np.array(unit(rows[:, 0], rows[:, 1]) + unit(rows[:, 2], rows[:, 3])).T
+
+
+def table(rows, header, columns):
+    lines = [",".join(f"{x:.7g}" for x in row[:columns]) for row in rows]
+    return "\n".join([header, *lines]) + "\n"
+
+
+def cpu_seconds():
+    of_children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return of_children.ru_utime + resource.getrusage(resource.RUSAGE_SELF).ru_utime
+
+
+def ask(gonia, source, rows):
+    asked = subprocess.run(
+        [gonia, "query", source], input=table(rows, HEADER, 4), text=True, capture_output=True, check=True
+    )
+    symmetry = [part for part in asked.stderr.split(", ") if part.startswith("symmetry")]
+    values = [float(line.split(",")[4]) for line in asked.stdout.split("\n")[1:] if line]
+    return np.array(values), " ".join(symmetry)
+
+
+def main():
+    gonia, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+    step = sys.argv[3] if len(sys.argv) > 3 else "2"
+    print("| set | method | RMS | median | p95 | core-s | |\n|---|---|---|---|---|---|---|")
+    for path in sorted(folder.glob("*.csv")):
+        rows = read(path)
+        held_out = np.random.default_rng(1).random(len(rows)) < 0.2
+        known, asked = rows[~held_out], rows[held_out]
+
+        def say(method, predict):
+            start = cpu_seconds()
+            values, note = predict()
+            off = np.abs(np.log(np.maximum(values, 1e-9) / asked[:, 4]))
+            figures = [np.sqrt(np.mean(off**2)), np.median(off), np.quantile(off, 0.95)]
+            figures = " | ".join(f"{x:.4f}" for x in figures)
+            print(f"| {path.stem} | {method} | {figures} | {cpu_seconds() - start:.1f} | {note} |", flush=True)
+
+        with tempfile.TemporaryDirectory() as at:
+            samples, dense = f"{at}/samples.csv", f"{at}/dense.exr"
+            pathlib.Path(samples).write_text(table(known, HEADER + ",brdf", 5))
+
+            def by_grid():
+                fill = [gonia, "fill", samples, "-o", dense, "--step", step]
+                subprocess.run(fill, check=True, capture_output=True)
+                return ask(gonia, dense, asked)
+
+            def by_scipy():
+                rbf = RBFInterpolator(
+                    vectors(known),
+                    np.log(known[:, 4]),
+                    neighbors=min(200, len(known)),
+                    kernel="linear",
+                    smoothing=1e-3,
+                )
+                return np.exp(rbf(vectors(asked))), ""
+
+            say("query of the samples", lambda: ask(gonia, samples, asked))
+            say(f"grid of {step} degrees", by_grid)
+            say("scipy, linear, logarithms", by_scipy)
+
+
+main()

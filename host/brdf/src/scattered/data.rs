@@ -1,0 +1,76 @@
+//! Samples as they are measured, those of one place merged.
+
+use crate::direction::{Direction, Vec3};
+use crate::elementary::Elementary;
+use crate::sample::Sample;
+
+/// Samples whose angles agree within this are of one place, degrees.
+const SAME_DEG: f64 = 1e-3;
+/// What is not positive counts as this share of the median at least, where logarithms are taken.
+const FLOOR_SHARE: f64 = 1e-4;
+
+/// One place, and what was measured there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Datum {
+    pub light: Vec3,
+    pub view: Vec3,
+    /// Mean of the samples, per channel.
+    pub value: [f64; 3],
+    /// Natural logarithm of the value, per channel.
+    pub log: [f64; 3],
+    /// Number of samples.
+    pub count: f64,
+    /// What cross-validation leaves out together: the frame, or the place alone.
+    pub group: u32,
+}
+
+/// The places, in an order that depends on the samples alone.
+pub(super) fn merged(samples: &[Sample]) -> Vec<Datum> {
+    let key = |s: &Sample| {
+        [s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg]
+            .map(|angle| (f64::from(angle) / SAME_DEG).round() as i64)
+    };
+    let mut sorted: Vec<([i64; 4], &Sample)> = samples
+        .iter()
+        .filter(|s| s.rgb.iter().all(|v| v.is_finite()))
+        .map(|s| (key(s), s))
+        .collect();
+    sorted.sort_by_key(|(key, _)| *key);
+    let framed = samples.iter().any(|s| s.frame != Sample::NO_FRAME);
+    let mut data: Vec<Datum> = sorted
+        .chunk_by(|a, b| a.0 == b.0)
+        .enumerate()
+        .map(|(number, same)| {
+            let count = same.len() as f64;
+            let s = same[0].1;
+            let value = [0, 1, 2]
+                .map(|c| same.iter().map(|(_, s)| f64::from(s.rgb[c])).sum::<f64>() / count);
+            let direction =
+                |theta: f32, phi: f32| Direction::from_deg(theta.into(), phi.into()).to_vec3();
+            Datum {
+                light: direction(s.theta_i_deg, s.phi_i_deg),
+                view: direction(s.theta_v_deg, s.phi_v_deg),
+                value,
+                log: [0.0; 3],
+                count,
+                group: if framed { s.frame } else { number as u32 },
+            }
+        })
+        .collect();
+    let floors = [0, 1, 2].map(|c| floor(data.iter().map(|d| d.value[c])));
+    for datum in &mut data {
+        datum.log = [0, 1, 2].map(|c| datum.value[c].max(floors[c]).natural_log());
+    }
+    data
+}
+
+fn floor(values: impl Iterator<Item = f64>) -> f64 {
+    let mut positive: Vec<f64> = values.filter(|v| *v > 0.0).collect();
+    positive.sort_by(f64::total_cmp);
+    let smallest = positive.first().copied().unwrap_or(1.0);
+    let median = positive.get(positive.len() / 2).copied().unwrap_or(1.0);
+    // What was measured above zero stands, however dark.
+    smallest
+        .min(FLOOR_SHARE * median)
+        .max(f64::from(f32::MIN_POSITIVE))
+}

@@ -1,0 +1,494 @@
+//! Few samples, at scattered places: kriging in double precision at the very directions that are asked for.
+//!
+//! Where the blocks of [`interpolate`](crate::interpolate) share one system among thousands of cells, here each
+//! place has a system through the data nearest to it, so that effort goes where the data are. The symmetry of the
+//! material, the coordinates, the kernel and its nugget are chosen by cross-validation. All arithmetic is in
+//! double precision and in one order: the same numbers on every processor.
+
+mod choose;
+mod data;
+mod local;
+mod places;
+mod table;
+
+pub use choose::{Choice, Reason};
+
+use crate::direction::{Direction, Vec3};
+use crate::elementary::Elementary;
+use crate::interpolate::Coordinates;
+use crate::interpolate::coordinates::Pair;
+use crate::sample::Sample;
+use crate::symmetry::Symmetry;
+use data::Datum;
+use local::{Local, Predicted};
+use places::{Near, Places, exchanged};
+use rayon::prelude::*;
+
+/// More places than this are not few.
+pub const FEW: usize = 100_000;
+/// Fewer places than this say nothing.
+pub const PLACES_MIN: usize = 8;
+/// Frames that hold more places than this, on average, are images of many samples.
+const IMAGE: usize = 8;
+
+/// Data in a system where noise is most of what there is.
+const NEIGHBOURS_MOST: usize = 96;
+
+/// How values correlate by their distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScatteredKernel {
+    /// exp(−r): rough, as sharp peaks between few data are.
+    Exponential,
+    /// Matérn's with ν = 3/2: smooth.
+    Matern32,
+}
+
+impl ScatteredKernel {
+    fn scale(self) -> f64 {
+        match self {
+            ScatteredKernel::Exponential => 1.0,
+            ScatteredKernel::Matern32 => 3f64.sqrt(),
+        }
+    }
+
+    fn at(self, s: f64) -> f64 {
+        let decay = (-s).exponential();
+        match self {
+            ScatteredKernel::Exponential => decay,
+            ScatteredKernel::Matern32 => (1.0 + s) * decay,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            ScatteredKernel::Exponential => "exponential",
+            ScatteredKernel::Matern32 => "matern32",
+        }
+    }
+}
+
+/// How to fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The symmetry about the normal.
+    pub symmetry: Symmetry,
+    /// Whether a datum counts with light and view exchanged too. Where data contradict it, what is fitted
+    /// at a place and at its reciprocal one is averaged by the certainty of either.
+    pub reciprocal_data: bool,
+    /// Where distances are taken.
+    pub coordinates: Coordinates,
+    /// How values correlate by their distance.
+    pub kernel: ScatteredKernel,
+    /// Data in a system.
+    pub neighbours: usize,
+    /// Range of the kernel in radii of the neighbourhood.
+    pub range: f64,
+    /// Variance of the noise of one sample over that of the values in a neighbourhood.
+    pub nugget: f64,
+}
+
+impl Settings {
+    /// What is taken of data that are too few for cross-validation.
+    pub const DEFAULT: Settings = Settings {
+        symmetry: Symmetry::None,
+        reciprocal_data: true,
+        coordinates: Coordinates::sum_difference(1.0),
+        kernel: ScatteredKernel::Matern32,
+        neighbours: 64,
+        range: 8.0,
+        nugget: 1e-4,
+    };
+
+    /// The same with another nugget: little of a signal is left in noise, and more data average it.
+    fn with_nugget(self, nugget: f64) -> Self {
+        let neighbours = if nugget > 0.05 {
+            NEIGHBOURS_MOST
+        } else {
+            Self::DEFAULT.neighbours
+        };
+        Self {
+            nugget,
+            neighbours,
+            ..self
+        }
+    }
+}
+
+impl std::fmt::Display for Settings {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "kriging at each place, symmetry {}, {} data{}, {}, kernel {}, range {} radii, nugget {:e}",
+            self.symmetry,
+            self.neighbours,
+            if self.reciprocal_data {
+                ""
+            } else {
+                " not exchanged"
+            },
+            self.coordinates,
+            self.kernel.name(),
+            self.range,
+            self.nugget
+        )
+    }
+}
+
+/// What is kriged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Response {
+    /// Logarithms.
+    Logarithm,
+    /// Values as they are: noise about a small signal has no logarithm, and must average out.
+    Linear,
+}
+
+/// The signal is within the noise where the median is less than this many times the most negative value.
+const WITHIN_NOISE: f64 = 4.0;
+
+impl Response {
+    fn of(here: &[&Datum]) -> Self {
+        let within_noise = (0..3).any(|c| {
+            let mut values: Vec<f64> = here.iter().map(|d| d.value[c]).collect();
+            values.sort_by(f64::total_cmp);
+            let lowest = values.first().copied().unwrap_or(0.0);
+            lowest < 0.0 && values[values.len() / 2] < -WITHIN_NOISE * lowest
+        });
+        if within_noise {
+            Response::Linear
+        } else {
+            Response::Logarithm
+        }
+    }
+}
+
+/// A BRDF fitted to few samples, to be asked anywhere.
+pub struct ScatteredFit {
+    data: Vec<Datum>,
+    places: Places,
+    choice: Choice,
+}
+
+/// Whether samples are few, and scattered: not the images of a camera, which see many directions at once.
+pub fn is_few(samples: &[Sample]) -> bool {
+    if samples.len() > 8 * FEW {
+        return false;
+    }
+    let mut frames: Vec<u32> = samples.iter().map(|s| s.frame).collect();
+    frames.retain(|frame| *frame != Sample::NO_FRAME);
+    let framed = frames.len();
+    frames.sort_unstable();
+    frames.dedup();
+    framed <= IMAGE * frames.len() && data::merged(samples).len() <= FEW
+}
+
+impl ScatteredFit {
+    /// Fits samples, with a symmetry that is asked for or, without, with what they show. `None` of too few.
+    pub fn new(samples: &[Sample], symmetry: Option<Symmetry>) -> Option<Self> {
+        let data = data::merged(samples);
+        if data.len() < PLACES_MIN {
+            return None;
+        }
+        let choice = choose::choose(&data, symmetry);
+        let places = Places::new(&data, &choice.settings);
+        Some(Self {
+            data,
+            places,
+            choice,
+        })
+    }
+
+    /// Fits with settings that are known. `None` of too few.
+    pub fn with_settings(samples: &[Sample], settings: Settings) -> Option<Self> {
+        let data = data::merged(samples);
+        (data.len() >= PLACES_MIN).then(|| Self {
+            places: Places::new(&data, &settings),
+            choice: Choice::of(settings),
+            data,
+        })
+    }
+
+    /// The settings, and why these.
+    pub fn choice(&self) -> &Choice {
+        &self.choice
+    }
+
+    /// Number of places with a sample.
+    pub fn places(&self) -> usize {
+        self.data.len()
+    }
+
+    /// The value at a pair of directions per channel, positive and reciprocal, and its standard error.
+    pub fn at(&self, light: Direction, view: Direction) -> ([f64; 3], [f64; 3]) {
+        let predicted = self.predicted(light.to_vec3(), view.to_vec3());
+        let factor = self.choice.error_factor;
+        let error = [0, 1, 2].map(|c| factor * predicted.relative[c] * predicted.value[c]);
+        (predicted.value, error)
+    }
+
+    /// [`Self::at`] many pairs of light and view, by all threads.
+    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<([f64; 3], [f64; 3])> {
+        let at = |(light, view): &(Direction, Direction)| self.at(*light, *view);
+        pairs.par_iter().map(at).collect()
+    }
+
+    fn predicted(&self, light: Vec3, view: Vec3) -> Predicted {
+        let settings = &self.choice.settings;
+        let place = settings.coordinates.pair(light, view);
+        let here = self.predicted_at(place);
+        if settings.reciprocal_data {
+            return here;
+        }
+        preferred(&here, &self.predicted_at(exchanged(place)))
+    }
+
+    fn predicted_at(&self, place: Pair) -> Predicted {
+        predict(
+            &self.data,
+            &self.places,
+            &self.choice.settings,
+            place,
+            |_| true,
+        )
+    }
+}
+
+/// What the data that are kept say of a place.
+fn predict(
+    data: &[Datum],
+    places: &Places,
+    settings: &Settings,
+    place: Pair,
+    keep: impl Fn(u32) -> bool,
+) -> Predicted {
+    let near = places.around(place, settings.neighbours, settings, keep);
+    predict_from(data, &near, settings, place)
+}
+
+/// What the data near a place say of it.
+fn predict_from(data: &[Datum], near: &[Near], settings: &Settings, place: Pair) -> Predicted {
+    Local::fit(data, near, settings).map_or(
+        Predicted {
+            value: [1e-30; 3],
+            relative: [f64::INFINITY; 3],
+            noise: [0.0; 3],
+        },
+        |local| local.at(&place),
+    )
+}
+
+/// A place's own prediction where data lie near it, and that of the reciprocal place where they lie nearer
+/// to that one: what data say that contradict reciprocity.
+fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
+    let variance = |p: &Predicted| p.relative.iter().map(|r| r * r).sum::<f64>().max(1e-30);
+    let ratio = (variance(own) / (NEARER * variance(reciprocal))).powi(4);
+    let share = if ratio.is_finite() {
+        ratio / (1.0 + ratio)
+    } else {
+        1.0
+    };
+    let mut mean = *own;
+    for c in 0..3 {
+        let logs = [own, reciprocal].map(|p| p.value[c].natural_log());
+        mean.value[c] = ((1.0 - share) * logs[0] + share * logs[1]).exponential();
+        mean.relative[c] =
+            (1.0 - share) * own.relative[c].min(1e6) + share * reciprocal.relative[c].min(1e6);
+    }
+    mean
+}
+
+/// The reciprocal place is preferred where its variance is less by more than this.
+const NEARER: f64 = 4.0;
+
+/// The mean of two of one value, weighted by their certainty.
+fn averaged(a: &Predicted, b: &Predicted) -> Predicted {
+    let mut mean = *a;
+    for c in 0..3 {
+        let [wa, wb] = [a, b].map(|p| 1.0 / p.relative[c].powi(2).max(1e-18));
+        let share = wb / (wa + wb);
+        let log = (1.0 - share) * a.value[c].natural_log() + share * b.value[c].natural_log();
+        mean.value[c] = log.exponential();
+        mean.relative[c] = 1.0 / (wa + wb).sqrt();
+    }
+    mean
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::grid::Grid;
+    use crate::random::Random;
+
+    /// A lobe about the half vector over a base, `wide` as wide along x as across, and a share of it that goes with
+    /// twice the azimuth of the half vector.
+    fn material(light: Direction, view: Direction, wide: f64, wave: f64) -> f64 {
+        let [i, v] = [light, view].map(Direction::to_vec3);
+        let h = crate::direction::normalize([0, 1, 2].map(|k| i[k] + v[k]));
+        let slope2 = (h[0] / wide).powi(2) + (h[1] * wide).powi(2);
+        let lobe = (-slope2 / (0.09 * h[2] * h[2])).exponential();
+        let planar = h[0] * h[0] + h[1] * h[1];
+        let wave = 1.0 + wave * (h[0] * h[0] - h[1] * h[1]) / planar.max(1e-9);
+        (0.03 + 0.2 * lobe) * wave
+    }
+
+    fn direction(random: &mut Random, one_azimuth: bool) -> Direction {
+        let theta = random
+            .between(80f64.to_radians().cosine(), 1.0)
+            .arc_cosine();
+        let phi = if one_azimuth {
+            20.0
+        } else {
+            random.between(0.0, 360.0)
+        };
+        Direction::from_deg(theta.to_degrees(), phi)
+    }
+
+    fn samples(
+        n: usize,
+        one_azimuth: bool,
+        value: impl Fn(Direction, Direction, f64) -> f64,
+    ) -> Vec<Sample> {
+        let mut random = Random::new(3);
+        (0..n)
+            .map(|_| {
+                let light = direction(&mut random, one_azimuth);
+                let view = direction(&mut random, false);
+                let value = value(light, view, random.normal());
+                Sample::new(light, view, [value as f32; 3])
+            })
+            .collect()
+    }
+
+    fn of_material(n: usize, one_azimuth: bool, wide: f64, wave: f64) -> Vec<Sample> {
+        let noisy = |l, v, normal: f64| material(l, v, wide, wave) * (1.0 + 0.005 * normal);
+        samples(n, one_azimuth, noisy)
+    }
+
+    /// RMS of the logarithm of the fit over the truth at random pairs, and the share of them within 1.96 standard
+    /// errors.
+    fn error(fit: &ScatteredFit, wide: f64, wave: f64) -> (f64, f64) {
+        let mut random = Random::new(77);
+        let (mut squares, mut within) = (0.0, 0.0);
+        for _ in 0..500 {
+            let (light, view) = (direction(&mut random, false), direction(&mut random, false));
+            let truth = material(light, view, wide, wave);
+            let (value, error) = fit.at(light, view);
+            squares += (value[1] / truth).natural_log().powi(2) / 500.0;
+            within += f64::from((value[1] - truth).abs() <= 1.96 * error[1]) / 500.0;
+        }
+        (squares.sqrt(), within)
+    }
+
+    #[test]
+    fn isotropy_is_assumed_of_one_azimuth_and_holds_at_all() {
+        let fit = ScatteredFit::new(&of_material(1000, true, 1.0, 0.0), None).unwrap();
+        assert_eq!(fit.choice().reason, Reason::Assumed);
+        assert!(fit.choice().settings.symmetry.is_isotropic());
+        let (rms, within) = error(&fit, 1.0, 0.0);
+        assert!(rms < 0.015, "{rms}");
+        assert!(within > 0.9, "{within}");
+    }
+
+    #[test]
+    fn isotropy_is_found_at_many_azimuths_and_two_per_cent_speak_against_it() {
+        let isotropic = ScatteredFit::new(&of_material(1000, false, 1.0, 0.0), None).unwrap();
+        assert_eq!(isotropic.choice().reason, Reason::Shown);
+        assert!(isotropic.choice().settings.symmetry.is_isotropic());
+        let (rms, _) = error(&isotropic, 1.0, 0.0);
+        assert!(rms < 0.015, "{rms}");
+        for (wide, wave) in [(1.0, 0.02), (1.5, 0.0)] {
+            let fit = ScatteredFit::new(&of_material(1500, false, wide, wave), None).unwrap();
+            let symmetry = fit.choice().settings.symmetry;
+            assert!(!symmetry.is_isotropic(), "{wide} {wave}: {symmetry}");
+        }
+    }
+
+    #[test]
+    fn a_symmetry_that_is_contradicted_is_taken_and_said() {
+        let anisotropic = of_material(800, false, 1.5, 0.0);
+        let asked = ScatteredFit::new(&anisotropic, Some(Symmetry::Isotropic)).unwrap();
+        assert!(asked.choice().settings.symmetry.is_isotropic());
+        assert!(asked.choice().contradicted_by.is_some());
+        let isotropic = of_material(800, false, 1.0, 0.0);
+        let asked = ScatteredFit::new(&isotropic, Some(Symmetry::Isotropic)).unwrap();
+        assert_eq!(asked.choice().contradicted_by, None);
+    }
+
+    #[test]
+    fn noise_as_large_as_a_small_signal_averages_out_and_stays_positive() {
+        let noisy = samples(10_000, false, |_, _, normal| 0.001 * (1.0 + normal));
+        let fit = ScatteredFit::new(&noisy, None).unwrap();
+        let mut random = Random::new(5);
+        let pairs: Vec<_> = (0..1000)
+            .map(|_| (direction(&mut random, false), direction(&mut random, false)))
+            .collect();
+        let values = fit.at_all(&pairs);
+        assert!(values.iter().all(|(value, _)| value[0] > 0.0));
+        let mean = values.iter().map(|(value, _)| value[0]).sum::<f64>() / 1000.0;
+        assert!((mean / 0.001 - 1.0).abs() < 0.02, "{mean}");
+    }
+
+    #[test]
+    fn a_dense_table_is_that_of_the_fit_reciprocal_and_one_value_a_pole() {
+        let fit = ScatteredFit::new(&of_material(500, true, 1.0, 0.0), None).unwrap();
+        let grid = Grid::with_step_deg(15.0).unwrap();
+        let (dense, errors) = fit.dense(grid, true);
+        let n = grid.n_directions();
+        assert!(
+            errors
+                .unwrap()
+                .iter()
+                .flatten()
+                .all(|e| e.is_finite() && *e > 0.0)
+        );
+        let mut worst = 0f64;
+        for light in 0..n {
+            for view in 0..n {
+                let value = dense.at(light, view);
+                assert!(value[0] > 0.0 && value[0].is_finite());
+                assert_eq!(value, dense.at(view, light));
+                if light < grid.n_phi() {
+                    assert_eq!(value, dense.at(0, view));
+                }
+                if (light + 7 * view) % 41 == 0 {
+                    let (at, _) = fit.at(grid.direction(light), grid.direction(view));
+                    worst = worst.max((f64::from(value[1]) / at[1]).natural_log().abs());
+                }
+            }
+        }
+        // Cells that share a system differ a little from one of their own.
+        assert!(worst < 0.1, "{worst}");
+    }
+
+    #[test]
+    fn too_few_for_cross_validation_get_simple_defaults() {
+        let few = ScatteredFit::new(&of_material(12, true, 1.0, 0.0), None).unwrap();
+        assert_eq!(
+            (few.choice().log_error, few.choice().reason),
+            (None, Reason::Assumed)
+        );
+        assert!(
+            few.at(
+                Direction::from_deg(30.0, 200.0),
+                Direction::from_deg(10.0, 0.0)
+            )
+            .0[0]
+                > 0.0
+        );
+        assert!(ScatteredFit::new(&of_material(5, true, 1.0, 0.0), None).is_none());
+    }
+
+    #[test]
+    fn images_of_a_camera_are_not_few_samples() {
+        let framed = |per_frame: u32| -> Vec<Sample> {
+            let samples = of_material(300, false, 1.0, 0.0).into_iter();
+            let numbered = samples.enumerate();
+            numbered
+                .map(|(k, s)| s.in_frame(k as u32 / per_frame))
+                .collect()
+        };
+        assert!(is_few(&of_material(300, false, 1.0, 0.0)) && is_few(&framed(1)));
+        assert!(!is_few(&framed(50)));
+    }
+}
