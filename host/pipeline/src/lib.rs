@@ -17,6 +17,7 @@
 //! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples or bins | a dense BRDF, with standard errors where asked for |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
+//! | [`export`] | a dense BRDF | a file in another group's format, and what was lost |
 //! | [`baselines`] | a measurement | other ways to the same BRDF, and how far each is |
 //! | [`chart`] | samples | what accuracy costs, method by method |
 //!
@@ -30,6 +31,7 @@ pub mod chart;
 pub mod compare;
 mod doubts;
 mod error;
+pub mod export;
 mod fill;
 pub mod fit;
 pub mod process;
