@@ -9,6 +9,7 @@ mod imports;
 mod length;
 mod links;
 mod modules;
+mod readers;
 mod size;
 mod steps;
 mod systems;
@@ -27,6 +28,7 @@ cargo xtask size     flash and RAM of every board against its budget
 cargo xtask systems  lint everything for Windows and macOS (the tests do so for Windows)
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
 cargo xtask windows  run the demo under Wine: the same bytes as on Linux
+cargo xtask readers  what gonia exports, read by other programs (from PyPI)
 cargo xtask book     check the links of all pages and build the book in docs/book
 cargo xtask figures [NAME]  measure a table of the book and write it; without NAME, list them";
 
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         "systems" => steps::systems(),
         "fuzz" => steps::fuzz(),
         "windows" => windows::compare_with_linux(),
+        "readers" => readers::check(),
         "book" => book::book(),
         "figures" => tools::root().and_then(|root| figures::figures(&root, &rest)),
         _ => {

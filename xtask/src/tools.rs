@@ -65,7 +65,7 @@ pub fn install_library(name: &str, packages: &[&str]) -> bool {
 }
 
 /// Installs Debian packages when this user may.
-fn apt_get(packages: &[&str]) {
+pub fn apt_get(packages: &[&str]) {
     let id = Command::new("id").arg("-u").output();
     if !id.is_ok_and(|o| o.stdout.trim_ascii() == b"0") || !has("apt-get") {
         return;

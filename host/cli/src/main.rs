@@ -12,6 +12,7 @@ mod chart_motion;
 mod compare;
 mod demo;
 mod device;
+mod export;
 mod fill;
 mod fit;
 mod import;
@@ -71,6 +72,8 @@ enum Command {
     Fit(fit::Fit),
     /// Other people's measurements → dense BRDF
     Import(import::Import),
+    /// A dense BRDF → other people's formats
+    Export(export::Export),
     /// Values of a dense BRDF at directions read from standard input
     Query(query::Query),
     /// How far one dense BRDF is from another, by stratum
@@ -119,6 +122,7 @@ fn start(cli: Cli) -> anyhow::Result<()> {
         Command::Fill(command) => command.run(),
         Command::Fit(command) => command.run(),
         Command::Import(command) => command.run(),
+        Command::Export(command) => command.run(),
         Command::Query(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Chart(command) => command.run(),

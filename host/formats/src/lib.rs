@@ -59,6 +59,7 @@ mod raw_png;
 mod raw_tiff;
 mod read_at;
 mod reflectance_csv;
+mod rgl;
 pub mod rig_toml;
 mod sample_columns;
 mod sample_note;

@@ -34,6 +34,7 @@ pub(super) static FORMAT: Format = Format {
             scale: Some(Scale::Absolute),
             read: |path| Ok(Box::new(read_merl(path)?)),
         },
+        write: None,
     }),
 };
 

@@ -1,13 +1,13 @@
 //! The table of all formats, and how a file's format is recognised.
 
 use crate::format::{Content, Format};
-use crate::{FileError, dense_exr, merl, ngan, samples_csv, samples_npy, samples_npz, utia};
+use crate::{FileError, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 /// Every format. The first one of each kind is written where a name has no known ending.
-static FORMATS: [&Format; 7] = [
+static FORMATS: [&Format; 8] = [
     &dense_exr::FORMAT,
     &samples_npy::FORMAT,
     &samples_csv::FORMAT,
@@ -15,6 +15,7 @@ static FORMATS: [&Format; 7] = [
     &utia::FORMAT,
     &merl::FORMAT,
     &ngan::FORMAT,
+    &rgl::FORMAT,
 ];
 
 /// The formats of a kind, in the order of the table.

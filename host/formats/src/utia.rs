@@ -30,6 +30,7 @@ pub(super) static FORMAT: Format = Format {
             scale: None,
             read: |path| Ok(Box::new(read_utia(path)?)),
         },
+        write: None,
     }),
 };
 

@@ -65,6 +65,14 @@ pub enum Error {
         /// Frames with a number.
         frames: usize,
     },
+    /// A format means 1/sr, and the values are relative.
+    #[error(
+        "the BRDF is relative, and a {format} means 1/sr: give the factor that makes it so (--assume-scale 1 takes the values as they are)"
+    )]
+    RelativeExport {
+        /// The format's name.
+        format: &'static str,
+    },
     /// The caller's progress callback said so.
     #[error("cancelled")]
     Cancelled,

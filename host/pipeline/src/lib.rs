@@ -19,6 +19,7 @@
 //! | [`fit_of_samples`] | few samples | a fit that is asked anywhere, without a grid |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
+//! | [`export`] | a dense BRDF | a file in another group's format, and what was lost |
 //! | [`baselines`] | a measurement | other ways to the same BRDF, and how far each is |
 //! | [`chart`] | samples | what accuracy costs, method by method |
 //!
@@ -34,6 +35,7 @@ pub mod chart;
 pub mod compare;
 mod doubts;
 mod error;
+pub mod export;
 mod fill;
 pub mod fit;
 pub mod process;

@@ -1,0 +1,96 @@
+//! Measured materials of RGL (Dupuy and Jakob 2018), `.bsdf`: what Mitsuba's `measured` reads.
+//!
+//! For each direction of the light (P azimuths, T polar angles) f·cosθv stands on a square of R × R
+//! places. A place u of the half vector m is (√(2θm/π), (φm + π)/2π); the density `vndf` over u says where
+//! places lie close: s = its running integral at u, and f·cosθv = rgb(s)·ndf(u)/(4·sigma(u of the light)).
+//! Written here, vndf and ndf are 1 and sigma ¼, so that s = u and `rgb` is f·cosθv itself. `luminance` is the density over s by which
+//! a renderer chooses directions.
+
+mod read;
+mod tensor_file;
+mod warp;
+mod write;
+
+use crate::format::{Content, ForeignContent, ForeignFormat, ForeignWriter, Format, Resolution};
+use gonia_rig::Scale;
+
+/// The format.
+pub(super) static FORMAT: Format = Format {
+    name: "RGL, Mitsuba's measured",
+    endings: &["bsdf"],
+    magic: tensor_file::MAGIC,
+    content: Content::Foreign(ForeignFormat {
+        name: "RGL .bsdf",
+        content: ForeignContent::Brdf {
+            scale: Some(Scale::Absolute),
+            read: |path| Ok(Box::new(read::read(path)?)),
+        },
+        write: Some(ForeignWriter {
+            name: "rgl",
+            read: |path| Ok(Box::new(read::read(path)?)),
+            write: write::write,
+            resolution: Some(Resolution {
+                default: 32,
+                least: 8,
+                most: 128,
+                of: "places of the half vector along each side of a square",
+            }),
+        }),
+    }),
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::ExportSettings;
+    use gonia_brdf::direction::Vec3;
+    use gonia_brdf::{Brdf, DenseBrdf, Direction, Elementary, Grid};
+    use gonia_rig::DenseFile;
+    use std::collections::BTreeMap;
+
+    /// Not the same with light and view both turned by 180°, nor mirrored.
+    struct Lopsided(f64);
+
+    impl Brdf for Lopsided {
+        fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
+            let lobe = |v: Vec3| 1.0 + 0.4 * v[0] + 0.3 * v[1] + 0.3 * v[0] * v[1];
+            let half: f64 = (0..3).map(|i| (light[i] + view[i]).powi(2)).sum();
+            let shine = (-self.0 * (1.0 - (light[2] + view[2]) / half.sqrt())).exponential();
+            let both = lobe(light) * lobe(view);
+            [0.1 * both + shine, 0.2 * both + shine, 0.3 * both + shine]
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_the_right_way_round() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("lopsided.bsdf");
+        for (sharpness, limits) in [(30.0, [0.005, 0.05]), (200.0, [0.005, 0.05])] {
+            let model = Lopsided(sharpness);
+            let brdf = DenseBrdf::tabulate(Grid::with_step_deg(4.0).unwrap(), &model);
+            let file = DenseFile {
+                brdf,
+                scale: Scale::Absolute,
+                provenance: BTreeMap::from([("material".to_owned(), "lopsided".to_owned())]),
+            };
+            write::write(&path, &file, &ExportSettings { resolution: 32 }).unwrap();
+            let read = read::read(&path).unwrap();
+            let mut errors = Vec::new();
+            for k in 0..2000 {
+                let angle = |by: f64, range: f64| (f64::from(k) * by).fract() * range;
+                let light = Direction::from_deg(angle(0.618_034, 75.0), angle(0.754_878, 360.0));
+                let view = Direction::from_deg(angle(0.569_84, 75.0), angle(0.438_58, 360.0));
+                let wanted = file.brdf.lookup(light, view);
+                let found = read.eval(light.to_vec3(), view.to_vec3());
+                for c in 0..3 {
+                    errors.push((found[c] / f64::from(wanted[c])).natural_log().abs());
+                }
+            }
+            errors.sort_by(f64::total_cmp);
+            let quantile = |share: f64| errors[(share * errors.len() as f64) as usize];
+            // Turned or mirrored it would be off by tens of per cent everywhere.
+            assert!(quantile(0.5) < limits[0], "{}", quantile(0.5));
+            assert!(quantile(0.99) < limits[1], "{}", quantile(0.99));
+        }
+    }
+}
