@@ -119,7 +119,7 @@ impl<'a> Shooter<'a> {
 
     /// The figures.
     pub fn finish(mut self) -> SessionSummary {
-        self.summary.duration_us = self.arms.now_us() - self.began_us;
+        self.summary.duration_us = self.arms.now_us().saturating_sub(self.began_us);
         (self.summary.events_lost, self.summary.requests_repeated) = self.arms.losses();
         self.summary
     }

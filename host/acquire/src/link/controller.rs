@@ -289,11 +289,14 @@ impl RemoteController {
     /// Lets time pass, and reads what arrives.
     pub fn rest(&mut self, for_us: u64) -> Result<(), LinkError> {
         let until_us = self.now_us() + for_us;
-        while self.now_us() < until_us {
-            let wait_us = until_us - self.now_us();
+        loop {
+            // Read once: the clock goes on between two looks at it.
+            let wait_us = until_us.saturating_sub(self.now_us());
+            if wait_us == 0 {
+                return Ok(());
+            }
             self.listen(wait_us, None)?;
         }
-        Ok(())
     }
 
     /// Restarts the host watchdog, if it is due.

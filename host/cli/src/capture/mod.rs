@@ -223,6 +223,7 @@ fn provenance_of(equipment: &mut Equipment, reference: bool) -> SessionProvenanc
         began: String::new(),
         rig_crc: String::new(),
         plan_crc: String::new(),
+        reference_crc: None,
         reference,
         camera: equipment.camera.identity(),
         seed: equipment.seed,
@@ -309,7 +310,11 @@ fn list_frames(session: &SessionFolder) -> Result<()> {
 fn describe(session: &SessionFolder, ended: &Ended) -> Vec<(String, String)> {
     let planned = session.roles().len() * session.plan().len();
     let took_s = ended.took.as_secs_f64();
-    let active_s = (ended.took - ended.paused).as_secs_f64().max(1e-9);
+    let active_s = ended
+        .took
+        .saturating_sub(ended.paused)
+        .as_secs_f64()
+        .max(1e-9);
     let mut rows = vec![
         (
             "poses".to_owned(),
