@@ -32,7 +32,7 @@ mod sensor;
 mod sound_samples;
 pub mod stratum;
 
-pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
+pub use bench_setup::{ArmPorts, DEFAULT_BAUD, SessionSettings, Source, Thermometer};
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
 pub use check::{check_rig, rig_remarks};

@@ -11,7 +11,8 @@
 //! | `thermometer`, `disk` | the conditions under which poses count |
 //! | `keep_out`, `timing`, `pace` | ways that keep the arms apart; how long moves and sessions take |
 //! | `guard` | faults of this program, which cost a frame |
-//! | `watch`, `orders`, `port` | events for those who watch; orders; ports that are opened again |
+//! | `watch`, `orders` | events for those who watch; orders |
+//! | `port`, `usb_port` | ports that are opened again, also under another name |
 
 mod arms;
 mod coordinator;
@@ -30,6 +31,7 @@ mod thermometer;
 mod timing;
 mod travel;
 mod unattended;
+mod usb_port;
 mod watch;
 
 pub use arms::{Arms, BadExposures, HomeError, ShotOptions};
