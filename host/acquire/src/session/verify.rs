@@ -54,7 +54,6 @@ impl Verdict {
 pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
     let session = SessionFolder::open(folder)?;
     let mut findings = Vec::new();
-    let path = folder.join(JOURNAL);
     if session.lines.torn_bytes > 0 {
         findings.push(Finding::Note(format!(
             "{JOURNAL}: the last {} bytes are the start of a line whose program died",
@@ -91,6 +90,32 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
         )));
     }
     check_kept_frames(&session, &mut findings);
+    check_end(&session, &mut findings);
+    let entries = session.journal();
+    let starts = entries
+        .iter()
+        .filter(|e| matches!(e, Entry::Start(_)))
+        .count();
+    let stops = entries
+        .iter()
+        .filter(|e| matches!(e, Entry::Stop(..)))
+        .count();
+    let still = usize::from(session.end().is_none());
+    Ok(Verdict {
+        planned: session.roles().len() * session.plan().len(),
+        done: session.done().count(),
+        starts,
+        kills: starts.saturating_sub(stops + still),
+        frame_bytes,
+        max_pointing_deg: session.done().map(|p| p.pointing_deg).fold(0.0, f64::max),
+        end: session.end().map(|(end, reason)| (end, reason.to_owned())),
+        findings,
+    })
+}
+
+/// What is left to do, and whether the session says that nothing is.
+fn check_end(session: &SessionFolder, findings: &mut Vec<Finding>) {
+    let path = session.folder().join(JOURNAL);
     let missing: usize = session
         .roles()
         .iter()
@@ -113,7 +138,7 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
             "go on with gonia capture --resume",
         )));
     }
-    let doubtful = doubtful(&session);
+    let doubtful = doubtful(session);
     if let Some((SessionEnd::Finished, _)) = session.end()
         && doubtful > 0
     {
@@ -123,26 +148,6 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
             "go on with gonia capture --resume: it takes the control pose",
         )));
     }
-    let entries = session.journal();
-    let starts = entries
-        .iter()
-        .filter(|e| matches!(e, Entry::Start(_)))
-        .count();
-    let stops = entries
-        .iter()
-        .filter(|e| matches!(e, Entry::Stop(..)))
-        .count();
-    let still = usize::from(session.end().is_none());
-    Ok(Verdict {
-        planned: session.roles().len() * session.plan().len(),
-        done: session.done().count(),
-        starts,
-        kills: starts.saturating_sub(stops + still),
-        frame_bytes,
-        max_pointing_deg: session.done().map(|p| p.pointing_deg).fold(0.0, f64::max),
-        end: session.end().map(|(end, reason)| (end, reason.to_owned())),
-        findings,
-    })
 }
 
 /// Poses that a control pose could vouch for, and none does.
