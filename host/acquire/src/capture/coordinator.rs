@@ -80,8 +80,7 @@ impl<'a> Coordinator<'a> {
         watch: &'a dyn Watch,
         orders: &'a Orders,
         channels: Channels,
-        role: Role,
-        pulses: usize,
+        (role, pulses): (Role, usize),
         (max_retries, pause): (u32, Duration),
     ) -> Self {
         Self {

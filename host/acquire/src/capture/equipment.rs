@@ -358,8 +358,8 @@ mod tests {
                 "plan, pose 1: the arms would be 5.0 degrees",
             ),
             (
-                [pose(0.0, 20.0), pose(89.9, 35.0)],
-                "plan, pose 1: theta 89.9 degrees",
+                [pose(0.0, 20.0), pose(120.0, 35.0)],
+                "plan, pose 1: theta 120 degrees",
             ),
         ] {
             let error = equipment.check_reach(&plan).unwrap_err().to_string();

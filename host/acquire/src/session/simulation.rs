@@ -336,7 +336,13 @@ impl World {
             Box::new(DiskFile { disk, which }) as Box<dyn LogFile>
         });
         let state = self.states.last().unwrap().clone();
+        let on_disk = journal::lines_of(Path::new(JOURNAL), &self.disk().files[0].synced);
+        let on_disk = on_disk.unwrap().entries.len();
         let opened = SessionWriter::over(Path::new(""), files.into(), &lines, state);
+        if opened.is_err() {
+            // What a killed program has not synced nobody has vouched for, until the next one has opened it.
+            self.states.truncate(on_disk + 1);
+        }
         let run = opened.and_then(|mut writer| {
             let run = self.run(&mut writer);
             if self.disk().is_dead {

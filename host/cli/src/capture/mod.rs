@@ -77,7 +77,7 @@ pub struct Capture {
 /// The session's folder, before the controllers are connected.
 enum Folder {
     Fresh(Claim),
-    Begun(SessionWriter),
+    Begun(Box<SessionWriter>),
 }
 
 impl Capture {
@@ -115,7 +115,7 @@ impl Capture {
         equipment.check_reach(&plan)?;
         let provenance = provenance_of(&mut equipment, settings.reference);
         let mut writer = match folder {
-            Folder::Begun(writer) => writer,
+            Folder::Begun(writer) => *writer,
             Folder::Fresh(claim) => claim.begin(Beginning {
                 rig: &rig_text,
                 beside,
@@ -184,7 +184,7 @@ impl Capture {
                 path.display()
             );
         }
-        Ok((Folder::Begun(writer), plan))
+        Ok((Folder::Begun(Box::new(writer)), plan))
     }
 
     /// Notes the poses that a person leaves out. A pose that is done stays.

@@ -83,8 +83,7 @@ impl RoleRun<'_> {
             self.session.watch,
             self.session.orders,
             channels,
-            self.role,
-            settings.exposures_s.len(),
+            (self.role, settings.exposures_s.len()),
             (
                 settings.max_retries,
                 Duration::from_secs_f64(settings.pause_s),
