@@ -308,3 +308,82 @@ impl SessionState {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn replayed(lines: &[&str]) -> SessionState {
+        let mut state = SessionState::new(10, 0.02);
+        for line in lines {
+            state.apply(&Entry::parse(line).unwrap()).unwrap();
+        }
+        state
+    }
+
+    fn done(state: &SessionState, role: Role) -> Vec<usize> {
+        state.role(role).done().map(|pose| pose.index).collect()
+    }
+
+    const SAME: &str = "control material pose 0: brightness +0.01 %, points scatter 0.10 %, marks moved 0.001 degrees";
+    const DARK: &str = "control material pose 0: brightness -10.00 %, points scatter 0.10 %, marks moved 0.001 degrees";
+
+    #[test]
+    fn an_older_journal_that_kept_doubtful_poses_over_a_kill_keeps_them_no_more() {
+        let pose = |i: usize| {
+            format!(
+                "pose material {i} at={} bytes=9 crc=00000001 pointing=0.001000",
+                9 * i
+            )
+        };
+        let poses: Vec<String> = (0..5).map(pose).collect();
+        let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|i| poses[i].as_str());
+        // As the older program left it: no void after the control that was a tenth darker.
+        let state = replayed(&[
+            "start gonia 0.1.0",
+            a,
+            b,
+            SAME,
+            c,
+            d,
+            "start gonia 0.1.0",
+            DARK,
+            "event the lamp has drifted",
+            SAME,
+            e,
+            SAME,
+            "stop finished every pose is done",
+        ]);
+        assert_eq!(done(&state, Role::Material), [0, 1, 4]);
+        assert_eq!(state.role(Role::Material).doubtful(), [0usize; 0]);
+        assert_eq!(state.to_measure(Role::Material), [2, 3, 5, 6, 7, 8, 9]);
+        // Its void is of both roles.
+        let state = replayed(&["start gonia 0.1.0", a, b, "void since=2 the lamp is darker"]);
+        assert_eq!(done(&state, Role::Material), [0]);
+    }
+
+    #[test]
+    fn what_no_entry_can_follow_is_refused_and_changes_nothing() {
+        let mut state =
+            replayed(&["pose material 3 at=0 bytes=9 crc=00000001 pointing=0.001000 lines=seen"]);
+        let before = state.clone();
+        for (line, expected) in [
+            (
+                "pose material 3 at=9 bytes=9 crc=00000001 pointing=0.001000",
+                "material pose 3 is done twice",
+            ),
+            (
+                "pose reference 10 at=9 bytes=9 crc=00000001 pointing=0.001000",
+                "reference pose 10 is not in the plan",
+            ),
+            (
+                "left-out material pose 10: by hand",
+                "material pose 10 is not in the plan",
+            ),
+        ] {
+            let refused = state.apply(&Entry::parse(line).unwrap()).unwrap_err();
+            assert_eq!(refused.to_string(), expected);
+            assert_eq!(state, before);
+        }
+    }
+}

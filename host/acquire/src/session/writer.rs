@@ -63,7 +63,13 @@ impl Claim {
             check_name(folder, name)?;
         }
         check_writable(folder)?;
-        check_fresh(folder, beside)?;
+        if let Err(error) = check_fresh(folder, beside) {
+            // A session that another program is just beginning is in use, first of all.
+            if folder.join(LOCK).is_file() {
+                lock(folder)?;
+            }
+            return Err(error);
+        }
         Ok(Self {
             folder: folder.to_owned(),
             lock: lock(folder)?,
@@ -523,5 +529,31 @@ pub(super) mod tests {
         std::fs::write(&path, text.replace("0.8", "0.7")).unwrap();
         let error = SessionFolder::open(folder.path()).unwrap_err().to_string();
         assert!(error.contains("tile.csv: has changed since"), "{error}");
+    }
+
+    #[test]
+    fn a_journal_of_an_older_program_goes_on_with_the_same_baseline() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = begin(folder.path());
+        writer.note(&Entry::Start("now".into())).unwrap();
+        for i in 1..4 {
+            writer.keep(&some_frame(i, Role::Reference), 0.001).unwrap();
+        }
+        drop(writer);
+        let path = folder.path().join(JOURNAL);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let older = |line: &str| {
+            let (line, _) = line.rsplit_once(" #").unwrap();
+            let line = line.replace(" lines=seen", "");
+            format!("{line} #{:08x}\n", crc32c(line.as_bytes()))
+        };
+        let older: String = text.lines().map(older).collect();
+        assert!(!older.contains("lines="));
+        std::fs::write(&path, older).unwrap();
+        let (writer, session) = SessionWriter::resume(folder.path()).unwrap();
+        let reference = writer.state().role(Role::Reference);
+        assert_eq!(reference.baseline().map(|pose| pose.index), Some(1));
+        assert_eq!(session.state(), writer.state());
+        assert_eq!(reference.doubtful(), [1, 2, 3]);
     }
 }

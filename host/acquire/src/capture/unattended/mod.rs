@@ -15,6 +15,7 @@ use crate::capture::watch::{SessionEvent, Watch};
 use crate::session::{
     CHANGE_THE_SAMPLE, Entry, SessionEnd, SessionFolder, SessionState, SessionWriter,
 };
+use gonia_brdf::Pose;
 use gonia_formats::FileError;
 use gonia_rig::{Rig, Role, SessionSettings};
 use role_run::{RoleRun, Totals};
@@ -63,7 +64,7 @@ impl UnattendedSession<'_> {
     /// Takes all poses that are missing.
     ///
     /// # Errors
-    /// When the folder cannot be read, or the journal's last line not be written.
+    /// When the journal's last line cannot be written.
     pub fn run(
         &self,
         arms: &mut Arms,
@@ -87,7 +88,13 @@ impl UnattendedSession<'_> {
             if result.is_err() || is_complete {
                 continue;
             }
-            let baseline = baseline.map(|pose| session.frame(&pose)).transpose()?;
+            let baseline = match baseline.map(|pose| session.frame(&pose)).transpose() {
+                Ok(frame) => frame,
+                Err(error) => {
+                    result = Err(Halt::Failed(error.to_string()));
+                    continue;
+                }
+            };
             let changed = *role == Role::Reference
                 || baseline.is_some()
                 || !session.provenance().reference
@@ -121,15 +128,7 @@ impl UnattendedSession<'_> {
         let result =
             result.and_then(|()| if_none_is_given_up(lock(&writer).state(), session.roles()));
         let (end, reason) = how_it_ended(&result);
-        if matches!(result, Err(Halt::Stopped(_))) {
-            // They have been stopped already; this is for a stop that did not arrive.
-            let _ = shooter.arms().stop();
-        } else if matches!(end, SessionEnd::Finished | SessionEnd::Failed)
-            && let Some(first) = session.plan().first()
-        {
-            // A fault that ended the session may forbid it; then they stay where they are.
-            let _ = shooter.park(first);
-        }
+        rest_arms(&mut shooter, &result, session.plan().first());
         let took = began.elapsed();
         let ended = Ended {
             end,
@@ -151,6 +150,21 @@ impl UnattendedSession<'_> {
             }
             Halt::Failed(error.to_string())
         })
+    }
+}
+
+/// Leaves the arms where a session that ended so leaves them: at its first pose, or where they are.
+fn rest_arms(shooter: &mut Shooter, result: &Result<(), Halt>, first: Option<&Pose>) {
+    match (result, first) {
+        (Err(Halt::Stopped(_)), _) => {
+            // They have been stopped already; this is for a stop that did not arrive.
+            let _ = shooter.arms().stop();
+        }
+        (Ok(()) | Err(Halt::Failed(_)), Some(first)) => {
+            // A fault that ended the session may forbid it; then they stay where they are.
+            let _ = shooter.park(first);
+        }
+        _ => {}
     }
 }
 
