@@ -110,6 +110,7 @@ fn measure(folder: &Path) -> Result<[f32; 3], Box<dyn Error>> {
         began: String::new(),
         rig_crc: String::new(),
         plan_crc: String::new(),
+        reference_crc: None,
         reference: settings.reference,
         camera: camera.identity(),
         seed: Some(1),

@@ -26,7 +26,7 @@ pub struct Device {
     /// A serial port, or unix:PATH for a socket
     port: String,
     /// Baud rate of the serial port
-    #[arg(long, default_value_t = 921_600)]
+    #[arg(long, default_value_t = gonia_rig::DEFAULT_BAUD)]
     baud: u32,
     #[command(subcommand)]
     action: Action,

@@ -49,9 +49,9 @@ pub struct Plan {
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     dwell: f64,
     /// Arms that can touch: leave out poses whose light and view are nearer to each other than this,
-    /// and see how the arms get past each other, in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
-    keep_out: f64,
+    /// and see how the arms get past each other, in degrees [default: arms.keep_out_deg of the rig]
+    #[arg(long, value_name = "DEG")]
+    keep_out: Option<f64>,
 }
 
 impl Plan {
@@ -62,9 +62,7 @@ impl Plan {
         if !(0.0..=86_400.0).contains(&self.dwell) {
             bail!("--dwell {}: must lie in 0..=86400 seconds", self.dwell);
         }
-        if !(0.0..180.0).contains(&self.keep_out) {
-            bail!("--keep-out {}: must lie in 0..180 degrees", self.keep_out);
-        }
+        let keep_out_deg = self.keep_out_deg(&rig)?;
         if !(1..=ADD_MAX).contains(&self.add) {
             bail!("--add {}: must lie in 1..={ADD_MAX} poses", self.add);
         }
@@ -84,11 +82,14 @@ impl Plan {
             check_limits(&rings)?;
             (travelling(&rings), Vec::new())
         } else {
-            let proposal = propose(&rig, &self.adaptive, self.add, self.keep_out)?;
+            let proposal = propose(&rig, &self.adaptive, self.add, keep_out_deg)?;
             let plan = travelling_order(&proposal.poses);
             (plan, vec![expectation(proposal.error)])
         };
-        let apart = (self.keep_out > 0.0).then(|| keep_apart(&mut plan, self.keep_out));
+        let apart = (keep_out_deg > 0.0).then(|| keep_apart(&mut plan, keep_out_deg));
+        if plan.poses.is_empty() {
+            bail!("no pose is left: at each the arms would be nearer than {keep_out_deg} degrees");
+        }
         let mut rows = estimate(&rig, &plan, self.dwell);
         rows.extend(proposed);
         if let Some(apart) = apart {
@@ -96,9 +97,8 @@ impl Plan {
                 (
                     "left out".into(),
                     format!(
-                        "{} poses nearer than {} deg, {} without a clear way",
+                        "{} poses nearer than {keep_out_deg} deg, {} without a clear way",
                         table::count(apart.too_near as u64),
-                        self.keep_out,
                         table::count(apart.out_of_reach as u64)
                     ),
                 ),
@@ -114,6 +114,24 @@ impl Plan {
         }
         table::print(&rows);
         Ok(())
+    }
+}
+
+impl Plan {
+    /// The angle that light and view keep from each other. A session refuses poses below that of the rig.
+    fn keep_out_deg(&self, rig: &Rig) -> Result<f64> {
+        let of_rig_deg = rig.arms.as_ref().map_or(0.0, |arms| arms.keep_out_deg);
+        let keep_out_deg = self.keep_out.unwrap_or(of_rig_deg);
+        if !(0.0..180.0).contains(&keep_out_deg) {
+            bail!("--keep-out {keep_out_deg}: must lie in 0..180 degrees");
+        }
+        if keep_out_deg < of_rig_deg {
+            bail!(
+                "--keep-out {keep_out_deg}: the arms of this rig touch below {of_rig_deg} degrees (arms.keep_out_deg in {}), and a session refuses such poses; leave --keep-out out",
+                self.rig.display()
+            );
+        }
+        Ok(keep_out_deg)
     }
 }
 

@@ -256,6 +256,118 @@ fn ctrl_c_ends_a_session_at_the_next_pose_and_a_second_capture_is_kept_out() {
 
 #[test]
 #[cfg(target_os = "linux")]
+fn a_terminal_that_closes_and_a_shutdown_end_a_session_as_ctrl_c_does() {
+    for signal in ["-HUP", "-TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        write_small(folder.path(), &small_rig(), 400);
+        let mut child = start(folder.path(), false);
+        let s = folder.path().join("s");
+        let began = Instant::now();
+        let has_pose = || {
+            let journal = std::fs::read_to_string(s.join("journal.log"));
+            journal.is_ok_and(|text| text.contains(" pose "))
+        };
+        while !has_pose() && began.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // Nobody reads what it says any more, as when a connection drops.
+        drop(child.stderr.take());
+        let signalled = Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(signalled.success());
+        assert_eq!(child.wait().unwrap().code(), Some(1), "{signal}");
+        let text = std::fs::read_to_string(s.join("journal.log")).unwrap();
+        assert!(
+            text.lines().last().unwrap().contains("stop paused"),
+            "{text}"
+        );
+        let verdict = verify(&s).unwrap();
+        assert_eq!((verdict.kills, verdict.broken().count()), (0, 0));
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_session_whose_terminal_is_closed_goes_on_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    write_small(folder.path(), &small_rig(), 8);
+    let mut child = start(folder.path(), false);
+    drop(child.stderr.take());
+    assert!(child.wait().unwrap().success());
+    let verdict = verify(&folder.path().join("s")).unwrap();
+    assert_eq!((verdict.done, verdict.broken().count()), (16, 0));
+}
+
+#[test]
+fn a_pose_is_left_out_without_another_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    write_small(folder.path(), &small_rig(), 8);
+    let (rig, plan, s) = (at("rig.toml"), at("plan.csv"), at("s"));
+    let args = ["capture", &s, "--rig", &rig, "--plan", &plan, "--resume"];
+    let with = |more: &str| {
+        let mut all = args.to_vec();
+        all.extend(["--leave-out", more]);
+        gonia(&all, "")
+    };
+    let refused = with("8");
+    assert_eq!(refused.status.code(), Some(1));
+    let errors = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        errors.contains("the plan has 8 poses, counted from 0"),
+        "{errors}"
+    );
+    let output = with("3");
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{errors}");
+    let verdict = verify(Path::new(&s)).unwrap();
+    assert_eq!((verdict.done, verdict.broken().count()), (14, 0));
+    let text = std::fs::read_to_string(at("s/journal.log")).unwrap();
+    assert!(
+        text.contains("left-out material pose 3: left out by hand"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_plan_keeps_the_arms_of_its_rig_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let mut rig = small_rig();
+    rig.arms = Some(gonia_rig::ArmPorts {
+        light: "none".into(),
+        camera: "none".into(),
+        baud: gonia_rig::DEFAULT_BAUD,
+        keep_out_deg: 20.0,
+    });
+    write_small(folder.path(), &rig, 8);
+    let (rig, plan, s) = (at("rig.toml"), at("plan.csv"), at("s"));
+    let rings = ["--views", "0:1,30:4", "--lights", "0:1,40:4"];
+    let mut args = vec!["plan", &rig];
+    args.extend(rings);
+    // The zenith twice, and each of four pairs of one azimuth.
+    let table = gonia_ok(&args, "");
+    assert!(table.contains("5 poses nearer than 20 deg"), "{table}");
+    args.extend(["--keep-out", "5"]);
+    let output = gonia(&args, "");
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(errors.contains("touch below 20 degrees"), "{errors}");
+    // Poses of the small plan are nearer than that.
+    let output = gonia(&["capture", &s, "--rig", &rig, "--plan", &plan], "");
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        errors.contains("plan, pose 0: the arms would be"),
+        "{errors}"
+    );
+    assert!(!Path::new(&s).join("provenance.toml").exists());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
 fn a_disk_that_takes_nothing_for_a_while_costs_no_pose() {
     use std::io::{BufRead, BufReader};
     let alone = tempfile::tempdir().unwrap();

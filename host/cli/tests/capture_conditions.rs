@@ -34,6 +34,10 @@ enum Act {
     Dark,
     /// Something was moved.
     Moved,
+    /// The frame shows nothing, if it is of the first pose.
+    Black,
+    /// The camera's software fails.
+    Panic,
 }
 
 struct Troubled {
@@ -80,6 +84,9 @@ impl Camera for Troubled {
                     *pixel = pixel.map(|v| share * v);
                 }
             }
+            Some(Act::Black) if shot.frame == 0 => frame.rgb.fill([0.0; 3]),
+            Some(Act::Black) => {}
+            Some(Act::Panic) => panic!("of a camera, on purpose"),
             None => {}
         }
         Ok(frame)
@@ -233,10 +240,130 @@ fn poses_measured_under_a_darker_lamp_are_measured_again_when_it_is_back() {
     assert_eq!(crcs(folder.path()), crcs(calm.path()));
     let text = journal(folder.path());
     assert!(
-        text.contains(" void since=") && text.contains("the lamp has drifted"),
+        text.contains(" void material since=") && text.contains("the lamp has drifted"),
         "{text}"
     );
     assert_eq!(verify(folder.path()).unwrap().broken().count(), 0);
+}
+
+/// Ends the session as `kill -9` does, as far as its folder can tell: without the last line.
+fn forget_the_stop(folder: &Path) {
+    let text = journal(folder);
+    let end = text.trim_end().rfind('\n').unwrap() + 1;
+    assert!(text[end..].contains(" stop "), "{text}");
+    std::fs::write(folder.join("journal.log"), &text[..end]).unwrap();
+}
+
+#[test]
+fn poses_measured_under_a_darker_lamp_before_a_kill_are_measured_again_after_it() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().reference = false;
+    let writer = begin(folder.path(), &rig, POSES);
+    let orders = Orders::default();
+    // The lamp is a tenth darker from pose 3 on; the program dies after pose 5, before any control.
+    struct EndAfter(Orders);
+    impl Watch for EndAfter {
+        fn on_event(&self, event: &SessionEvent) {
+            if matches!(event, SessionEvent::Pose { done, .. } if done.index == 5) {
+                self.0.interrupt();
+            }
+        }
+    }
+    let dark: Trouble = |call, _| (call >= 3).then_some(Act::Dark);
+    let watch = EndAfter(orders.clone());
+    let surroundings = Surroundings {
+        watch: &watch,
+        ..Surroundings::calm(&orders)
+    };
+    let camera = |trouble: Trouble| {
+        move |rig: &Rig, sim: SimRig| -> Box<dyn Camera> {
+            Box::new(Troubled {
+                camera: RenderingCamera::new(rig, sim, 1, POSES, true),
+                trouble,
+                calls: 0,
+                first_pose: 1,
+                extra: 0,
+                changes: true,
+            })
+        }
+    };
+    let none = FaultPlan::default;
+    run_with(folder.path(), writer, none(), &surroundings, camera(dark));
+    forget_the_stop(folder.path());
+    assert!(crcs(folder.path()).len() >= 6);
+    // It is still dark at the first control after the kill, and bright again after it.
+    let later: Trouble = |call, _| (call == 0).then_some(Act::Dark);
+    let (writer, _) = SessionWriter::resume(folder.path()).unwrap();
+    let orders = Orders::default();
+    let calm_again = Surroundings::calm(&orders);
+    let ended = run_with(folder.path(), writer, none(), &calm_again, camera(later));
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    assert!(journal(folder.path()).contains("judgement=drifted"));
+}
+
+#[test]
+fn a_control_frame_that_shows_nothing_is_taken_once_more_and_ends_no_session() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    // The first control pose: the second frame of pose 0.
+    let (folder, ended) = under(
+        |_, first_pose| (first_pose == 1).then_some(Act::Black),
+        FaultPlan::default(),
+    );
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let text = journal(folder.path());
+    assert!(text.contains("judgement=unconfirmed unseen"), "{text}");
+    // Nothing speaks against the poses before it.
+    assert!(!text.contains(" void "), "{text}");
+}
+
+#[test]
+fn a_session_whose_watcher_or_camera_panics_goes_on() {
+    let (calm, _) = under(quiet, FaultPlan::default());
+    struct Panicking(AtomicU32);
+    impl Watch for Panicking {
+        fn on_event(&self, event: &SessionEvent) {
+            let is_frame = matches!(
+                event,
+                SessionEvent::Frame { .. } | SessionEvent::Pose { .. }
+            );
+            if is_frame && self.0.fetch_add(1, Ordering::SeqCst) % 3 == 1 {
+                panic!("of a watcher, on purpose");
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().reference = false;
+    let writer = begin(folder.path(), &rig, POSES);
+    let orders = Orders::default();
+    let watch = Panicking(AtomicU32::new(0));
+    let surroundings = Surroundings {
+        watch: &watch,
+        ..Surroundings::calm(&orders)
+    };
+    let none = FaultPlan::default();
+    let ended = run_with(folder.path(), writer, none, &surroundings, |rig, sim| {
+        Box::new(Troubled {
+            camera: RenderingCamera::new(rig, sim, 1, POSES, true),
+            trouble: |call, _| (call == 4).then_some(Act::Panic),
+            calls: 0,
+            first_pose: 0,
+            extra: 0,
+            changes: true,
+        })
+    });
+    assert_eq!(
+        (ended.end, ended.retaken),
+        (SessionEnd::Finished, 1),
+        "{}",
+        ended.reason
+    );
+    assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    assert!(journal(folder.path()).contains("a fault of this program (of a camera, on purpose)"));
 }
 
 #[test]

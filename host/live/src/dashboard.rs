@@ -404,6 +404,7 @@ mod tests {
             bytes: 0,
             crc: 0,
             pointing_deg: 0.001 * f64::from(index),
+            has_lines: Some(true),
         };
         board.handle(&SessionEvent::Pose {
             done: &done,

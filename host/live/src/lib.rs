@@ -10,11 +10,13 @@
 //! | `filled`, `slice` | bins filled so far, and a slice through them as a picture |
 //! | `thumbnail` | [`Thumbnail`]: the last frame with its fiducial lines |
 //! | `server` | [`LivePage`]: a thread that serves page, pictures, changes and orders |
+//! | `listener` | connections, of which none is idle |
 //! | `guard`, `page` | who may look and who may order; the document and its policy |
 
 mod dashboard;
 mod filled;
 mod guard;
+mod listener;
 mod page;
 mod server;
 mod slice;

@@ -2,6 +2,7 @@
 
 use crate::dashboard::Dashboard;
 use crate::guard::{Guard, random_hex};
+use crate::listener::{IDLE, LimitedListener};
 use crate::page;
 use crate::thumbnail::Thumbnail;
 use axum::Router;
@@ -163,6 +164,7 @@ impl LivePage {
             runtime.block_on(async {
                 let listener = tokio::net::TcpListener::from_std(listening.0);
                 if let Ok(listener) = listener {
+                    let listener = LimitedListener::new(listener, IDLE);
                     // It ends with the runtime, and so do the browsers' streams.
                     tokio::spawn(axum::serve(listener, router).into_future());
                     if stopped.await.is_ok() {

@@ -79,26 +79,33 @@ fn reverse_a_stretch(path: &mut [usize], times: &[Vec<f64>]) -> bool {
 }
 
 fn move_a_stretch(path: &mut Vec<usize>, times: &[Vec<f64>]) -> bool {
-    let total = |path: &[usize]| -> f64 { path.windows(2).map(|w| times[w[0]][w[1]]).sum() };
+    let step = |a: Option<&usize>, b: Option<&usize>| match (a, b) {
+        (Some(a), Some(b)) => times[*a][*b],
+        _ => 0.0,
+    };
     let mut improved = false;
     for length in 1..=STRETCH {
         let mut first = 1;
         while first + length <= path.len() {
-            let stretch: Vec<usize> = path[first..first + length].to_vec();
-            let mut rest = path.clone();
-            rest.drain(first..first + length);
-            let before = total(path);
-            let best = (1..=rest.len())
-                .map(|at| {
-                    let mut candidate = rest.clone();
-                    candidate.splice(at..at, stretch.iter().copied());
-                    candidate
-                })
-                .min_by(|a, b| total(a).total_cmp(&total(b)));
-            if let Some(best) = best
-                && total(&best) < before - GAIN
+            let end = first + length;
+            let (head, tail) = (path.get(first), path.get(end - 1));
+            // What the path gains without the stretch.
+            let (before, after) = (path.get(first - 1), path.get(end));
+            let gain = step(before, head) + step(tail, after) - step(before, after);
+            // And what it costs between each two neighbours of the rest, or at its end.
+            let cost = |at: usize| {
+                let rest = |k: usize| path.get(if k < first { k } else { k + length });
+                let (left, right) = (rest(at - 1), rest(at));
+                step(left, head) + step(tail, right) - step(left, right)
+            };
+            let best = (1..=path.len() - length)
+                .map(|at| (at, cost(at)))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((at, cost)) = best
+                && cost < gain - GAIN
             {
-                *path = best;
+                let stretch: Vec<usize> = path.drain(first..end).collect();
+                path.splice(at..at, stretch);
                 improved = true;
             }
             first += 1;
@@ -118,6 +125,42 @@ mod tests {
             .to_vec();
         let path = shortest_path(&mixed, &|a, b| (a.theta - b.theta).abs());
         assert_eq!(path, [0, 4, 2, 5, 3, 1]);
+    }
+
+    #[test]
+    fn a_stretch_goes_where_it_costs_least_and_the_path_is_never_longer_for_it() {
+        let way =
+            |a: &Direction, b: &Direction| (a.theta - b.theta).abs().max((a.phi - b.phi).abs());
+        // Scattered, and the same every time.
+        let places: Vec<Direction> = (0..60)
+            .map(|k| Direction::from_deg(f64::from(k * 37 % 90), f64::from(k * 101 % 360)))
+            .collect();
+        let times = both_ways(&places, &way);
+        let total = |path: &[usize]| -> f64 { path.windows(2).map(|w| times[w[0]][w[1]]).sum() };
+        let mut path: Vec<usize> = (0..60).collect();
+        let mut last = total(&path);
+        let mut moves = 0;
+        while move_a_stretch(&mut path, &times) {
+            assert!(total(&path) < last, "{} {last}", total(&path));
+            last = total(&path);
+            moves += 1;
+        }
+        assert!(moves > 1);
+        let mut sorted = path.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..60).collect::<Vec<_>>());
+        // No stretch of any length fits better anywhere else.
+        for length in 1..=STRETCH {
+            for first in 1..=path.len() - length {
+                let mut rest = path.clone();
+                let stretch: Vec<usize> = rest.drain(first..first + length).collect();
+                for at in 1..=rest.len() {
+                    let mut other = rest.clone();
+                    other.splice(at..at, stretch.iter().copied());
+                    assert!(total(&other) > last - 1e-6, "{first} {length} {at}");
+                }
+            }
+        }
     }
 
     #[test]

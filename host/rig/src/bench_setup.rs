@@ -108,8 +108,11 @@ impl Default for SessionSettings {
     }
 }
 
+/// What the project's own board speaks.
+pub const DEFAULT_BAUD: u32 = 921_600;
+
 fn default_baud() -> u32 {
-    115_200
+    DEFAULT_BAUD
 }
 
 fn default_seed() -> u64 {

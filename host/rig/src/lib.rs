@@ -38,7 +38,7 @@ mod sound_samples;
 pub mod stratum;
 
 pub use arm_geometry::{ArmGeometry, Placement, TargetPlace};
-pub use bench_setup::{ArmPorts, SessionSettings, Source, Thermometer};
+pub use bench_setup::{ArmPorts, DEFAULT_BAUD, SessionSettings, Source, Thermometer};
 pub use calibration::Calibration;
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;

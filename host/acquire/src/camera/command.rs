@@ -1,11 +1,12 @@
 //! A program that is run for every frame, and exposes it.
 
 use crate::camera::files::frame_of;
+use crate::camera::natural_order::in_order;
 use crate::camera::source::{Camera, CameraError, Pulse};
 use crate::program;
 use gonia_rig::{Frame, FrameRow, Rig};
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 /// Runs a command for each frame.
@@ -40,11 +41,7 @@ impl CommandCamera {
         };
         let (program, arguments) = self.run.split_first()?;
         let mut command = Command::new(program);
-        command
-            .args(arguments.iter().map(fill))
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
+        command.args(arguments.iter().map(fill));
         Some(command)
     }
 }
@@ -68,11 +65,11 @@ impl Camera for CommandCamera {
             program: self.run.first().cloned().unwrap_or_default(),
             source,
         })?;
-        let mut files: Vec<PathBuf> = std::fs::read_dir(folder.path())
+        let files: Vec<PathBuf> = std::fs::read_dir(folder.path())
             .map_err(CameraError::TemporaryFolder)?
             .filter_map(|item| Some(item.ok()?.path()))
             .collect();
-        files.sort();
+        let files = in_order(files);
         let (came, expected) = (files.len(), pulses.len());
         if came != expected {
             return Err(CameraError::FilesOfProgram { came, expected });

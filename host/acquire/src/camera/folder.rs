@@ -1,28 +1,55 @@
 //! A folder that another program fills: a file for every trigger pulse, in the order of their names.
 
 use crate::camera::files::{frame_of, is_foreign};
+use crate::camera::natural_order::in_order;
 use crate::camera::source::{Camera, CameraError, Pulse};
 use gonia_formats::FileError;
 use gonia_rig::{Frame, FrameRow, Rig};
-use std::collections::BTreeSet;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::collections::BTreeMap;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
 
-/// Pause between two looks into the folder.
+/// Pause between two looks into the folder, at least.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// And so many times as long as a look takes: thousands of files on a slow disk take a while.
+const LOOKS: u32 = 5;
+/// Folders are looked into so deep: camera programs sort frames by date, and by card.
+const DEPTH: usize = 3;
+/// Names of files in an error.
+const NAMED: usize = 4;
+
+/// What tells a file from another, or from the one that it was: a program may write the same name again
+/// and again, and a counter may come round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Version {
+    bytes: u64,
+    changed: Option<SystemTime>,
+}
+
+impl Version {
+    fn of(file: &Metadata) -> Self {
+        Self {
+            bytes: file.len(),
+            changed: file.modified().ok(),
+        }
+    }
+}
+
+type Files = BTreeMap<PathBuf, Version>;
 
 /// Watches a folder.
 pub struct FolderCamera {
     rig: Rig,
     folder: PathBuf,
     timeout: Duration,
-    /// Files that are accounted for.
-    seen: BTreeSet<PathBuf>,
+    /// Files that are accounted for, as they were then.
+    seen: Files,
 }
 
 impl FolderCamera {
-    /// Watches a folder; what is in it now is ignored. A frame may take `timeout_s` seconds after its
-    /// trigger.
+    /// Watches a folder and the ones in it; what is there now is ignored. A frame may take `timeout_s`
+    /// seconds after its trigger.
     ///
     /// # Errors
     /// When there is no such folder.
@@ -31,83 +58,144 @@ impl FolderCamera {
             rig: rig.clone(),
             folder,
             timeout: Duration::from_secs_f64(timeout_s),
-            seen: BTreeSet::new(),
+            seen: Files::new(),
         };
-        camera.seen.extend(camera.new_files()?);
+        camera.seen = camera.files()?;
         Ok(camera)
     }
 
-    /// Files that are not accounted for, by name.
-    fn new_files(&self) -> Result<Vec<PathBuf>, CameraError> {
-        let failed = |error| CameraError::File(FileError::reading(&self.folder, &error));
-        let mut files = Vec::new();
-        for item in std::fs::read_dir(&self.folder).map_err(failed)? {
-            let path = item.map_err(failed)?.path();
-            if !is_foreign(&path) && !self.seen.contains(&path) {
-                files.push(path);
-            }
-        }
-        files.sort();
+    /// All files there are.
+    fn files(&self) -> Result<Files, CameraError> {
+        let mut files = Files::new();
+        list(&self.folder, DEPTH, &mut files)
+            .map_err(|error| CameraError::File(FileError::reading(&self.folder, &error)))?;
         Ok(files)
     }
 
-    /// Waits until so many files are there, at most until the timeout.
-    fn wait_for(&self, n: usize, until: Instant) -> Result<Vec<PathBuf>, CameraError> {
+    /// Files that are not accounted for.
+    fn new_files(&self) -> Result<Files, CameraError> {
+        let mut files = self.files()?;
+        files.retain(|path, version| self.seen.get(path) != Some(version));
+        Ok(files)
+    }
+
+    /// Waits until so many frames are there, at most until the timeout. Gives them in their order, and
+    /// all that came.
+    fn wait_for(&self, n: usize, until: Instant) -> Result<(Vec<PathBuf>, Files), CameraError> {
         loop {
-            let files = self.new_files()?;
-            if files.len() >= n || Instant::now() >= until {
-                return Ok(files);
+            let began = Instant::now();
+            let all = self.new_files()?;
+            let frames = all.keys().filter(|path| !is_foreign(path)).cloned();
+            let frames = in_order(frames.collect());
+            if frames.len() >= n || Instant::now() >= until {
+                return Ok((frames, all));
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::sleep(LOOK_EVERY.max(began.elapsed() * LOOKS));
         }
+    }
+
+    /// What is in the folder now is accounted for.
+    fn account_for(&mut self, files: Files) {
+        self.seen.extend(files);
     }
 }
 
 impl Camera for FolderCamera {
     fn identity(&self) -> String {
-        format!("folder {}", self.folder.display())
+        // The same from wherever the program is started.
+        let folder = std::fs::canonicalize(&self.folder);
+        let folder = folder.unwrap_or_else(|_| self.folder.clone());
+        format!("folder {}", folder.display())
     }
 
     fn ready(&mut self, strays: usize) -> Result<usize, CameraError> {
-        let files = self.wait_for(strays, Instant::now() + self.timeout)?;
-        let unasked = files.len().saturating_sub(strays);
-        self.seen.extend(files);
-        Ok(unasked)
+        let (frames, all) = self.wait_for(strays, Instant::now() + self.timeout)?;
+        self.account_for(all);
+        Ok(frames.len().saturating_sub(strays))
     }
 
     fn fetch(&mut self, _: &FrameRow, pulses: &[Pulse]) -> Result<Frame, CameraError> {
         let until = Instant::now() + self.timeout;
         let expected = pulses.len();
         loop {
-            let files = self.wait_for(expected, until)?;
-            let came = files.len();
+            let (frames, all) = self.wait_for(expected, until)?;
+            let came = frames.len();
             if came > expected {
-                self.seen.extend(files);
-                return Err(CameraError::TooMany { came, expected });
-            }
-            if came < expected {
-                let timeout_s = self.timeout.as_secs_f64();
-                self.seen.extend(files);
-                return Err(CameraError::Late {
+                self.account_for(all);
+                let files = named(&frames);
+                return Err(CameraError::TooManyFiles {
                     came,
                     expected,
-                    timeout_s,
+                    files,
                 });
             }
-            match frame_of(&self.rig, &files, pulses) {
-                // It may still be being written.
-                Err(_) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
-                result => {
-                    self.seen.extend(files);
-                    return result;
-                }
+            if came < expected {
+                let other = all.keys().find(|path| is_unread(path)).map(|p| name(p));
+                self.account_for(all);
+                let timeout_s = self.timeout.as_secs_f64();
+                return Err(match other {
+                    Some(other) => CameraError::Unread {
+                        came,
+                        expected,
+                        timeout_s,
+                        other,
+                    },
+                    None => CameraError::Late {
+                        came,
+                        expected,
+                        timeout_s,
+                    },
+                });
             }
+            let read = frame_of(&self.rig, &frames, pulses);
+            // It may still be being written: then it changes, or cannot be read.
+            let is_still = self.new_files()? == all;
+            if (read.is_ok() && is_still) || Instant::now() >= until {
+                self.account_for(all);
+                return read;
+            }
+            std::thread::sleep(LOOK_EVERY);
         }
     }
 
     fn reopen(&mut self) -> Result<(), CameraError> {
         self.new_files().map(drop)
     }
+}
+
+/// Adds the files of a folder, and of those in it. One that goes while it is looked at is left out.
+fn list(folder: &Path, depth: usize, files: &mut Files) -> std::io::Result<()> {
+    for item in std::fs::read_dir(folder)? {
+        let path = item?.path();
+        let Ok(found) = std::fs::metadata(&path) else {
+            continue;
+        };
+        if found.is_file() {
+            files.insert(path, Version::of(&found));
+        } else if found.is_dir() && depth > 0 {
+            // One that is gone again, or that nobody may read, holds no frame.
+            let _ = list(&path, depth - 1, files);
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file is none that is still being written, and of an ending that is not read.
+fn is_unread(file: &Path) -> bool {
+    is_foreign(file) && !name(file).starts_with('.')
+}
+
+fn name(file: &Path) -> String {
+    let name = file.file_name().unwrap_or(file.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+fn named(files: &[PathBuf]) -> String {
+    let mut text: Vec<String> = files.iter().take(NAMED).map(|file| name(file)).collect();
+    if files.len() > NAMED {
+        text.push("…".into());
+    }
+    text.join(", ")
 }
 
 #[cfg(test)]
@@ -156,7 +244,8 @@ mod tests {
         put("4.exr");
         put("5.exr");
         let many = camera.fetch(&row(), &[Pulse::new(0.01, 0)]).unwrap_err();
-        assert!(matches!(many, CameraError::TooMany { came: 2, .. }));
+        assert!(matches!(many, CameraError::TooManyFiles { came: 2, .. }));
+        assert!(many.to_string().contains("4.exr, 5.exr"), "{many}");
         // Half a file is waited for, and then refused.
         std::fs::write(folder.path().join("6.exr"), [0; 10]).unwrap();
         assert!(matches!(
@@ -165,5 +254,43 @@ mod tests {
         ));
         std::fs::remove_dir_all(folder.path()).unwrap();
         assert!(camera.reopen().is_err());
+    }
+
+    /// A frame of one value, so that it is known again.
+    fn flat(value: f32) -> Frame {
+        Frame {
+            width: 32,
+            height: 32,
+            rgb: vec![[value; 3]; 32 * 32],
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_written_again_is_another_frame_also_in_a_folder_below() {
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("2026-11-27").join("card 1");
+        std::fs::create_dir_all(&below).unwrap();
+        let path = below.join("capture.exr");
+        write_frame(&path, &flat(0.25)).unwrap();
+        let rig = Rig::paper(32);
+        let mut camera = FolderCamera::open(&rig, folder.path().to_owned(), 0.3).unwrap();
+        for value in [0.5, 0.75, 1.0] {
+            // The clocks of some file systems are coarse.
+            std::thread::sleep(Duration::from_millis(20));
+            write_frame(&path, &flat(value)).unwrap();
+            let frame = camera.fetch(&row(), &[Pulse::new(0.01, 0)]).unwrap();
+            assert_eq!(frame, flat(value));
+            assert_eq!(camera.ready(0).unwrap(), 0);
+        }
+    }
+
+    #[test]
+    fn files_of_an_ending_that_is_not_read_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let rig = Rig::paper(32);
+        let mut camera = FolderCamera::open(&rig, folder.path().to_owned(), 0.1).unwrap();
+        std::fs::write(folder.path().join("IMG_0001.CR3"), "raw").unwrap();
+        let late = camera.fetch(&row(), &[Pulse::new(0.01, 0)]).unwrap_err();
+        assert!(late.to_string().contains("IMG_0001.CR3"), "{late}");
     }
 }

@@ -8,6 +8,7 @@
 //! | `folder` | frames that another program leaves in a folder |
 //! | `command` | a program that is run for each frame |
 //! | `genicam` | GigE Vision cameras, with the feature `genicam` |
+//! | `natural_order` | files in the order of their counters |
 //! | `matching` | whether frames are those of the trigger pulses, by number and time |
 //! | `rendering` | the camera of the simulated rig |
 //! | `simulated_frames` | frames of the simulated rig without a session |
@@ -18,6 +19,7 @@ pub mod folder;
 #[cfg(feature = "genicam")]
 pub mod genicam;
 pub mod matching;
+mod natural_order;
 mod open;
 pub mod rendering;
 pub mod simulated_frames;

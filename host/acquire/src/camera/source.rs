@@ -85,6 +85,32 @@ pub enum CameraError {
         /// How long it was waited for, seconds.
         timeout_s: f64,
     },
+    /// Files came whose ending is not read, and none that is.
+    #[error(
+        "{came} of {expected} frames came within {timeout_s} s of the trigger, and \"{other}\", whose ending is not read; let the camera's program save exr, png, tif or tiff"
+    )]
+    Unread {
+        /// Frames that came.
+        came: usize,
+        /// Pulses given.
+        expected: usize,
+        /// How long it was waited for, seconds.
+        timeout_s: f64,
+        /// A file that came.
+        other: String,
+    },
+    /// More files than pulses.
+    #[error(
+        "{came} files came for {expected} trigger pulses ({files}); check the camera's trigger input, and that its program saves one file a frame"
+    )]
+    TooManyFiles {
+        /// Files that came.
+        came: usize,
+        /// Pulses given.
+        expected: usize,
+        /// Their names.
+        files: String,
+    },
     /// More frames than pulses.
     #[error("{came} frames came for {expected} trigger pulses; check the camera's trigger input")]
     TooMany {

@@ -2,10 +2,11 @@
 //! camera's thread and the worker's, and handles their events.
 
 use crate::camera::Camera;
-use crate::capture::frame_worker::{ControlTake, Fetched, Taken, Task, Work, WorkerEvent, lock};
+use crate::capture::frame_worker::{Fetched, Taken, Task, Work, WorkerEvent, lock};
 use crate::capture::orders::Orders;
 use crate::capture::watch::{SessionEvent, Watch};
-use crate::session::{Entry, SessionWriter};
+use crate::session::{ControlComparison, Entry, GivenUp, SessionWriter};
+use gonia_rig::Role;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -45,16 +46,14 @@ pub struct Coordinator<'a> {
     pub watch: &'a dyn Watch,
     pub orders: &'a Orders,
     channels: Channels,
+    /// What lies on the target.
+    pub role: Role,
     /// The session's folder.
     pub folder: PathBuf,
     /// Poses to be taken.
     pub queue: VecDeque<Task>,
-    /// Poses kept since the control pose was last found as it was.
-    pub since_control: Vec<usize>,
-    /// The control pose, once there is one.
-    pub control: Option<usize>,
     /// The last take of the control pose, until it is looked at.
-    pub control_take: Option<ControlTake>,
+    pub control_take: Option<Option<ControlComparison>>,
     /// Pulses a shot has.
     pub pulses: usize,
     /// Pulses whose frames nobody will fetch.
@@ -81,7 +80,7 @@ impl<'a> Coordinator<'a> {
         watch: &'a dyn Watch,
         orders: &'a Orders,
         channels: Channels,
-        pulses: usize,
+        (role, pulses): (Role, usize),
         (max_retries, pause): (u32, Duration),
     ) -> Self {
         Self {
@@ -90,10 +89,9 @@ impl<'a> Coordinator<'a> {
             watch,
             orders,
             channels,
+            role,
             folder: lock(writer).folder().to_owned(),
             queue: VecDeque::new(),
-            since_control: Vec::new(),
-            control: None,
             control_take: None,
             pulses,
             strays: 0,
@@ -113,6 +111,33 @@ impl<'a> Coordinator<'a> {
         self.watch.on_event(&SessionEvent::Note(text));
         // A disk that does not take this line is found out by the next frame.
         let _ = lock(self.writer).note(&Entry::Event(text.to_owned()));
+    }
+
+    /// Writes an entry that the session's state hangs on.
+    pub fn write(&self, entry: &Entry) -> Result<(), Halt> {
+        let written = lock(self.writer).note(entry);
+        written.map_err(|error| Halt::Failed(error.to_string()))
+    }
+
+    /// Gives a pose up, for as long as this program runs.
+    pub fn give_up(&self, index: usize, why: String) -> Result<(), Halt> {
+        let role = self.role;
+        let given_up = GivenUp {
+            role,
+            index,
+            why,
+            is_left_out: false,
+        };
+        self.watch.on_event(&SessionEvent::GivenUp {
+            index,
+            why: &given_up.to_string(),
+        });
+        self.write(&Entry::GivenUp(given_up))
+    }
+
+    /// Whether frames are under way that may yet be kept or taken again.
+    pub fn is_under_way(&self) -> bool {
+        self.in_flight.is_some() || self.in_work > 0
     }
 
     /// Both arms are at rest, and the trigger comes next: the last shot is closed, and the camera is ready
@@ -231,14 +256,16 @@ impl<'a> Coordinator<'a> {
                 self.fetched = Some(fetched);
                 Ok(())
             }
-            WorkerEvent::Kept { done, is_baseline } => {
-                self.since_control.push(done.index);
-                if is_baseline {
-                    self.control = Some(done.index);
-                }
-                Ok(())
-            }
+            // The writer's state has it.
+            WorkerEvent::Kept => Ok(()),
             WorkerEvent::Repeat(task, why) => self.again(task, &why),
+            WorkerEvent::Spoilt(task, why) => {
+                self.note(&format!("pose {}: {why}", task.index));
+                if task.tries < self.max_retries {
+                    return self.again(task, &why);
+                }
+                self.give_up(task.index, why)
+            }
             WorkerEvent::NotKept(task, error) => {
                 self.note(&format!("pose {}: {error}", task.index));
                 self.again(task, &error.to_string())?;

@@ -1,21 +1,20 @@
 //! What a session is measured with: two arms and a camera, as `rig.toml` and the command line name them.
 
 use crate::camera::{Camera, CameraError, CameraSetup, open_camera};
-use crate::capture::arms::{Arms, BadExposures, ShotOptions};
+use crate::capture::arms::{Arms, BadExposures, ShotOptions, pose_apart_deg};
 use crate::capture::orders::Orders;
 use crate::capture::port::SessionPort;
+use crate::capture::usb_port::{UsbPort, remedy_for};
 use crate::link::{LinkError, StreamTransport, Transport};
 use gonia_brdf::Pose;
 use gonia_protocol::settings::{Axis, Key};
-use gonia_rig::{Rig, SessionSettings, Source};
+use gonia_rig::{DEFAULT_BAUD, Rig, SessionSettings, Source};
 use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, FaultPlan};
 use gonia_sim::rig::SimRig;
 use std::io;
 use std::path::Path;
 
-/// The rate of a port whose rig names none, baud.
-const BAUD: u32 = 115_200;
 /// Of a simulated rig that `rig.toml` does not describe.
 const SIMULATED: Source = Source::Simulated {
     seed: 1,
@@ -67,14 +66,14 @@ pub enum EquipmentError {
         option: &'static str,
     },
     /// The port cannot be opened.
-    #[error(
-        "the {arm} arm's port {port} cannot be opened; check the cable, the name and that nobody else uses it: {source}"
-    )]
+    #[error("the {arm} arm's port {port} cannot be opened; {remedy}: {source}")]
     Port {
         /// Which arm: light or camera.
         arm: &'static str,
         /// Its port.
         port: String,
+        /// What to do.
+        remedy: String,
         /// What the system says.
         source: io::Error,
     },
@@ -102,6 +101,30 @@ pub enum EquipmentError {
         least_deg: f64,
         /// The upper limit.
         most_deg: f64,
+    },
+    /// A pose to whose azimuth an arm cannot turn.
+    #[error(
+        "plan, pose {index}: no turn of phi {phi_deg} degrees is within the {arm}'s limits; take it out of the plan, or widen the limits with gonia device"
+    )]
+    NoTurn {
+        /// Its place in the plan.
+        index: usize,
+        /// The azimuth that it asks of the arm.
+        phi_deg: f64,
+        /// The arm's name.
+        arm: String,
+    },
+    /// A pose at which the arms would touch.
+    #[error(
+        "plan, pose {index}: the arms would be {apart_deg:.1} degrees apart, and touch below {keep_out_deg:.1} (arms.keep_out_deg); make the plan with gonia plan RIG.toml, which leaves such poses out"
+    )]
+    TooNear {
+        /// Its place in the plan.
+        index: usize,
+        /// The angle between light and view.
+        apart_deg: f64,
+        /// The least one.
+        keep_out_deg: f64,
     },
 }
 
@@ -168,11 +191,30 @@ impl Equipment {
         Ok(equipment)
     }
 
-    /// Refuses poses that the controllers would refuse during the session.
+    /// Refuses, before anything moves, poses that the session would fail at.
     ///
     /// # Errors
-    /// A pose beyond the limits of θ, or a controller that does not answer.
+    /// A pose beyond the limits of θ, without a turn of φ within its limits, or at which the arms would
+    /// touch; or a controller that does not answer.
     pub fn check_reach(&mut self, plan: &[Pose]) -> Result<(), EquipmentError> {
+        for (index, pose) in plan.iter().enumerate() {
+            let apart_deg = pose_apart_deg(pose);
+            let keep_out_deg = self.arms.keep_out_deg;
+            if apart_deg < keep_out_deg {
+                return Err(EquipmentError::TooNear {
+                    index,
+                    apart_deg,
+                    keep_out_deg,
+                });
+            }
+            if let Some((arm, phi_deg)) = self.arms.without_turn(pose) {
+                return Err(EquipmentError::NoTurn {
+                    index,
+                    phi_deg,
+                    arm,
+                });
+            }
+        }
         for is_light in [true, false] {
             let controller = if is_light {
                 self.arms.light()
@@ -220,6 +262,7 @@ fn connect_simulated(sim: &SimRig, orders: &Orders) -> Result<Arms, EquipmentErr
         SessionPort::open(Box::new(open), orders).map_err(|source| EquipmentError::Port {
             arm: name,
             port: "simulated".into(),
+            remedy: "please report this".into(),
             source,
         })
     };
@@ -229,7 +272,7 @@ fn connect_simulated(sim: &SimRig, orders: &Orders) -> Result<Arms, EquipmentErr
 
 fn connect_serial(rig: &Rig, ports: ArmPortNames, orders: &Orders) -> Result<Arms, EquipmentError> {
     let of_rig = rig.arms.as_ref();
-    let baud = of_rig.map_or(BAUD, |arms| arms.baud);
+    let baud = of_rig.map_or(DEFAULT_BAUD, |arms| arms.baud);
     let light = ports.light.or(of_rig.map(|arms| arms.light.as_str()));
     let camera = ports.camera.or(of_rig.map(|arms| arms.camera.as_str()));
     let light = serial_port("light", "light", light, baud, orders)?;
@@ -247,13 +290,80 @@ fn serial_port(
     let port = port
         .ok_or(EquipmentError::NoPort { arm, option })?
         .to_owned();
-    let path = port.clone();
+    let mut usb = UsbPort::new(&port);
     let open = move || -> io::Result<Box<dyn Transport>> {
+        let path = usb.path();
         Ok(Box::new(StreamTransport::open_serial(&path, baud)?))
     };
     SessionPort::open(Box::new(open), orders).map_err(|source| EquipmentError::Port {
         arm,
+        remedy: remedy_for(&port, &source),
         port,
         source,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_brdf::Direction;
+
+    fn arms(first: Arm, second: Arm) -> Result<Arms, LinkError> {
+        let sim = simulated_arms(1, true);
+        Arms::connect(Box::new(sim.port(first)), Box::new(sim.port(second)))
+    }
+
+    #[test]
+    fn ports_that_were_exchanged_are_told_apart_and_used_rightly() {
+        let mut arms = arms(Arm::Camera, Arm::Light).unwrap();
+        assert_eq!(arms.light().name(), "light arm");
+        assert_eq!(arms.camera().name(), "camera arm");
+        let remark = arms.exchange_remark().unwrap().to_string();
+        assert!(remark.contains("exchange light and camera"), "{remark}");
+        assert_eq!(
+            self::arms(Arm::Light, Arm::Camera)
+                .unwrap()
+                .exchange_remark(),
+            None
+        );
+        let error = self::arms(Arm::Light, Arm::Light)
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            error.contains("both ports lead to the light arm"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_plan_is_refused_whole_before_anything_moves() {
+        let pose = |theta_i, theta_v| Pose {
+            light: Direction::from_deg(theta_i, 0.0),
+            view: Direction::from_deg(theta_v, 0.0),
+        };
+        let mut arms = arms(Arm::Light, Arm::Camera).unwrap();
+        arms.set_keep_out_deg(10.0);
+        let rig = Rig::paper(32);
+        let mut equipment = Equipment {
+            arms,
+            camera: Box::new(crate::camera::CommandCamera::new(&rig, Vec::new(), 1.0)),
+            seed: None,
+            exact: true,
+        };
+        equipment.check_reach(&[pose(0.0, 20.0)]).unwrap();
+        for (plan, said) in [
+            (
+                [pose(0.0, 20.0), pose(30.0, 35.0)],
+                "plan, pose 1: the arms would be 5.0 degrees",
+            ),
+            (
+                [pose(0.0, 20.0), pose(120.0, 35.0)],
+                "plan, pose 1: theta 120 degrees",
+            ),
+        ] {
+            let error = equipment.check_reach(&plan).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
 }

@@ -2,9 +2,9 @@
 //! samples and keeps them.
 
 use crate::camera::{Camera, CameraError, Pulse};
-use crate::capture::control::ControlComparison;
+use crate::capture::guard::unless_panics;
 use crate::capture::watch::{SessionEvent, Watch};
-use crate::session::{PoseDone, SessionWriter};
+use crate::session::{ControlComparison, SessionWriter};
 use gonia_formats::FileError;
 use gonia_formats::frame_exr::write_frame;
 use gonia_imaging::Registration;
@@ -56,31 +56,21 @@ pub enum Fetched {
     Nothing(CameraError),
 }
 
-/// A take of the control pose.
-pub enum ControlTake {
-    /// How it compares with the first take.
-    Compared(ControlComparison),
-    /// Its fiducial lines are not seen, or it has no point in common with the first take.
-    Unusable,
-}
-
 /// What the arms' thread is sent.
 pub enum WorkerEvent {
     /// The camera is free again.
     Fetched(Fetched),
     /// A pose is done.
-    Kept {
-        /// Its line in the journal.
-        done: PoseDone,
-        /// Control poses are compared with it from now on.
-        is_baseline: bool,
-    },
+    Kept,
+    /// This program failed at the frame; with what it says.
+    Spoilt(Task, String),
     /// The frame does not show its target; another take may. With the reason.
     Repeat(Task, String),
     /// The disk did not take it.
     NotKept(Task, FileError),
-    /// The control pose was taken.
-    Control(ControlTake),
+    /// The control pose was taken: how it compares with the first take; `None` when its fiducial lines are
+    /// not seen, or it has no point in common with the first take.
+    Control(Option<ControlComparison>),
 }
 
 /// Fetches a frame for every shot.
@@ -91,7 +81,10 @@ pub fn fetch_all(
     events: &Sender<WorkerEvent>,
 ) {
     for taken in shots {
-        let fetched = lock(camera).fetch(&taken.row, &taken.pulses);
+        // A camera that panics costs this frame; it is opened again.
+        let fetch = || lock(camera).fetch(&taken.row, &taken.pulses);
+        let fetched =
+            unless_panics(fetch).unwrap_or_else(|why| Err(CameraError::Other(why.into())));
         let fetched = match fetched {
             Ok(frame) => {
                 if work.send(Work::Frame(taken, frame)).is_err() {
@@ -133,28 +126,22 @@ pub struct FrameWorker<'a> {
 impl FrameWorker<'_> {
     /// Works until all senders of work are gone.
     pub fn work(&mut self, work: &Receiver<Work>, events: &Sender<WorkerEvent>) {
-        let mut held: Option<(Taken, SampledShot)> = None;
+        let mut held: Option<(Taken, Result<SampledShot, String>)> = None;
         for item in work {
             match item {
                 Work::Frame(taken, frame) => {
-                    let hidden = match taken.row.role {
-                        Role::Material if self.has_reference => Hidden::Known(None),
-                        _ => Hidden::Find,
-                    };
-                    let (sampled, registration) =
-                        self.sampler.sample_registered(&frame, &taken.row, hidden);
-                    let shot = SampledShot {
-                        frame,
-                        registration,
-                        sampled,
-                    };
+                    let shot = unless_panics(|| self.sample(&taken, frame));
                     held = Some((taken, shot));
                 }
                 Work::Discard => held = None,
                 Work::Confirm => {
-                    if let Some((taken, shot)) = held.take()
-                        && events.send(self.keep(taken, &shot)).is_err()
-                    {
+                    let Some((taken, shot)) = held.take() else {
+                        continue;
+                    };
+                    let task = taken.task.clone();
+                    let kept = shot.and_then(|shot| unless_panics(|| self.keep(taken, &shot)));
+                    let event = kept.unwrap_or_else(|why| WorkerEvent::Spoilt(task, why));
+                    if events.send(event).is_err() {
                         return;
                     }
                 }
@@ -162,9 +149,22 @@ impl FrameWorker<'_> {
         }
     }
 
+    fn sample(&self, taken: &Taken, frame: Frame) -> SampledShot {
+        let hidden = match taken.row.role {
+            Role::Material if self.has_reference => Hidden::Known(None),
+            _ => Hidden::Find,
+        };
+        let (sampled, registration) = self.sampler.sample_registered(&frame, &taken.row, hidden);
+        SampledShot {
+            frame,
+            registration,
+            sampled,
+        }
+    }
+
     fn keep(&mut self, taken: Taken, shot: &SampledShot) -> WorkerEvent {
         let SampledShot { frame, sampled, .. } = shot;
-        self.watch.on_event(&SessionEvent::Frame {
+        self.show(&SessionEvent::Frame {
             frame,
             registration: &shot.registration,
             sampled,
@@ -173,9 +173,7 @@ impl FrameWorker<'_> {
         if taken.task.is_control {
             let first = self.baseline.as_ref().filter(|_| is_locked);
             let comparison = first.and_then(|first| ControlComparison::of(first, sampled));
-            return WorkerEvent::Control(
-                comparison.map_or(ControlTake::Unusable, ControlTake::Compared),
-            );
+            return WorkerEvent::Control(comparison);
         }
         if let Outcome::Refused(refusal) = sampled.report.outcome
             && taken.task.tries == 0
@@ -191,17 +189,21 @@ impl FrameWorker<'_> {
         match kept {
             Err(error) => WorkerEvent::NotKept(taken.task, error),
             Ok(done) => {
-                let is_baseline = self.baseline.is_none() && is_locked;
-                if is_baseline {
+                if self.baseline.is_none() && is_locked {
                     self.baseline = Some(sampled.clone());
                 }
-                self.watch.on_event(&SessionEvent::Pose {
+                self.show(&SessionEvent::Pose {
                     done: &done,
                     frame: sampled,
                 });
-                WorkerEvent::Kept { done, is_baseline }
+                WorkerEvent::Kept
             }
         }
+    }
+
+    /// A watcher that fails costs no frame.
+    fn show(&self, event: &SessionEvent) {
+        let _ = unless_panics(|| self.watch.on_event(event));
     }
 }
 

@@ -7,16 +7,20 @@
 //! | `shot`, `shooter` | one pose with its retakes; [`run_session`] without a camera |
 //! | `unattended` | a whole session: roles, control pose, disk, temperature, orders |
 //! | `coordinator`, `frame_worker` | its threads: pulses and frames matched, frames sampled and kept |
-//! | `control`, `thermometer`, `disk` | the conditions under which poses count |
+//! | `course` | what comes next, by what the journal's entries have come to |
+//! | `thermometer`, `disk` | the conditions under which poses count |
 //! | `keep_out`, `timing`, `pace` | ways that keep the arms apart; how long moves and sessions take |
-//! | `watch`, `orders`, `port` | events for those who watch; orders; ports that are opened again |
+//! | `guard` | faults of this program, which cost a frame |
+//! | `watch`, `orders` | events for those who watch; orders |
+//! | `port`, `usb_port` | ports that are opened again, also under another name |
 
 mod arms;
-mod control;
 mod coordinator;
+mod course;
 mod disk;
 mod equipment;
 mod frame_worker;
+mod guard;
 pub mod keep_out;
 mod orders;
 mod pace;
@@ -27,10 +31,11 @@ mod thermometer;
 mod timing;
 mod travel;
 mod unattended;
+mod usb_port;
 mod watch;
 
 pub use arms::{Arms, BadExposures, HomeError, ShotOptions};
-pub use control::{ControlComparison, Judgement};
+pub use course::{AfterControl, Step, after_control, judged, next_step};
 pub use disk::free_mb;
 pub use equipment::{ArmPortNames, Equipment, EquipmentError, simulated_arms};
 pub use orders::Orders;

@@ -19,8 +19,11 @@ pub struct SessionPort {
     orders: Orders,
     /// The order to stop has been passed on; what follows is the stopping itself.
     has_stopped: bool,
-    /// When the port went, by its own clock and by the host's.
+    /// When the port went, by [`Transport::now_us`] and by the host's clock.
     gone: (u64, Instant),
+    /// A port that is opened again may begin its clock anew: when it was opened, by
+    /// [`Transport::now_us`] and by its own clock.
+    opened: (u64, u64),
 }
 
 impl SessionPort {
@@ -29,10 +32,12 @@ impl SessionPort {
     /// # Errors
     /// What the system says.
     pub fn open(mut open: PortOpener, orders: &Orders) -> io::Result<Self> {
-        let inner = Some(open()?);
+        let inner = open()?;
+        let began = inner.now_us();
         Ok(Self {
             open,
-            inner,
+            inner: Some(inner),
+            opened: (began, began),
             orders: orders.clone(),
             has_stopped: false,
             gone: (0, Instant::now()),
@@ -74,7 +79,10 @@ impl Transport for SessionPort {
             }
             None => {
                 std::thread::sleep(Duration::from_micros(slice_us));
-                self.inner = (self.open)().ok();
+                if let Ok(inner) = (self.open)() {
+                    self.opened = (self.now_us(), inner.now_us());
+                    self.inner = Some(inner);
+                }
             }
         }
         Ok(())
@@ -82,7 +90,10 @@ impl Transport for SessionPort {
 
     fn now_us(&self) -> u64 {
         match &self.inner {
-            Some(inner) => inner.now_us(),
+            Some(inner) => {
+                let (at_us, began_us) = self.opened;
+                at_us + inner.now_us().saturating_sub(began_us)
+            }
             None => self.gone.0 + self.gone.1.elapsed().as_micros() as u64,
         }
     }
@@ -114,6 +125,41 @@ mod tests {
         fn now_us(&self) -> u64 {
             1_000_000
         }
+    }
+
+    /// A port whose clock begins when it is opened, and which breaks at its third call.
+    struct Restarting(u64);
+
+    impl Transport for Restarting {
+        fn send(&mut self, _: &[u8]) -> io::Result<()> {
+            Ok(())
+        }
+
+        fn receive(&mut self, _: &mut Vec<u8>, _: u64) -> io::Result<()> {
+            self.0 += 1_000_000;
+            if self.0 > 3_000_000 {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            Ok(())
+        }
+
+        fn now_us(&self) -> u64 {
+            self.0
+        }
+    }
+
+    #[test]
+    fn a_port_that_is_opened_again_does_not_turn_the_clock_back() {
+        let open: PortOpener = Box::new(|| Ok(Box::new(Restarting(0)) as Box<dyn Transport>));
+        let mut port = SessionPort::open(open, &Orders::default()).unwrap();
+        let mut last_us = port.now_us();
+        for _ in 0..30 {
+            port.receive(&mut Vec::new(), 100).unwrap();
+            assert!(port.now_us() >= last_us, "{} {last_us}", port.now_us());
+            last_us = port.now_us();
+        }
+        // Six times three seconds went by.
+        assert!(last_us >= 18_000_000, "{last_us}");
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! Every pose of a list, one after the other.
 
-use crate::capture::arms::{Arms, HomeError, Latched, TryError};
+use crate::capture::arms::{Arms, HomeError, Latched, TryError, pose_apart_deg};
 use crate::capture::shot::{ShotOutcome, shot_of};
 use crate::capture::timing::POINTING_LIMIT_DEG;
 use crate::link::LinkError;
 use gonia_brdf::Pose;
-use gonia_brdf::direction::angle_between;
 use gonia_protocol::message::{ControllerState, RequestRefusal};
 use std::time::{Duration, Instant};
 
@@ -119,7 +118,7 @@ impl<'a> Shooter<'a> {
 
     /// The figures.
     pub fn finish(mut self) -> SessionSummary {
-        self.summary.duration_us = self.arms.now_us() - self.began_us;
+        self.summary.duration_us = self.arms.now_us().saturating_sub(self.began_us);
         (self.summary.events_lost, self.summary.requests_repeated) = self.arms.losses();
         self.summary
     }
@@ -242,7 +241,7 @@ impl<'a> Shooter<'a> {
     }
 
     fn check_apart(&self, index: usize, pose: &Pose) -> Result<(), SessionError> {
-        let apart_deg = angle_between(pose.light.to_vec3(), pose.view.to_vec3()).to_degrees();
+        let apart_deg = pose_apart_deg(pose);
         if apart_deg >= self.arms.keep_out_deg {
             return Ok(());
         }

@@ -2,8 +2,7 @@
 
 use crate::program::{self, ProgramError};
 use gonia_rig::Thermometer;
-use std::io::Read;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 /// A program that takes longer than this does not answer.
@@ -61,22 +60,12 @@ pub fn check(thermometer: &Thermometer) -> Result<(), TemperatureError> {
 fn read(run: &[String]) -> Result<f64, TemperatureError> {
     let name = || run.first().cloned().unwrap_or_default();
     let mut command = Command::new(name());
-    command
-        .args(run.get(1..).unwrap_or_default())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null());
-    let mut child =
-        program::run(&mut command, TIMEOUT).map_err(|source| TemperatureError::Program {
-            name: name(),
-            source,
-        })?;
-    let mut said = [0; 64];
-    let n = child
-        .stdout
-        .as_mut()
-        .map_or(Ok(0), |out| out.read(&mut said));
-    let said = String::from_utf8_lossy(&said[..n.unwrap_or(0)]);
+    command.args(run.get(1..).unwrap_or_default());
+    let said = program::run(&mut command, TIMEOUT).map_err(|source| TemperatureError::Program {
+        name: name(),
+        source,
+    })?;
+    let said = String::from_utf8_lossy(&said);
     let word = said.split_whitespace().next().unwrap_or_default();
     match word.parse::<f64>() {
         Ok(degrees) if degrees.is_finite() => Ok(degrees),

@@ -1,5 +1,6 @@
 //! The events of a running session, for those who watch it.
 
+use crate::capture::guard::unless_panics;
 use crate::session::PoseDone;
 use gonia_imaging::Registration;
 use gonia_pipeline::process::SampledFrame;
@@ -65,7 +66,8 @@ pub struct Watchers<'a>(pub Vec<&'a dyn Watch>);
 impl Watch for Watchers<'_> {
     fn on_event(&self, event: &SessionEvent) {
         for watch in &self.0 {
-            watch.on_event(event);
+            // Whoever fails to show an event misses it; the session goes on.
+            let _ = unless_panics(|| watch.on_event(event));
         }
     }
 }

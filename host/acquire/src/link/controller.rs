@@ -20,6 +20,11 @@ pub const HEARTBEAT_US: u64 = 250_000;
 const ASK_AFTER_US: u64 = 2_000_000;
 /// Captured pulses that are kept until they are read.
 const MAX_LATCHES: usize = 64;
+/// Ends that are kept until they are claimed. Nobody waits for more than a move and a trigger at a time;
+/// those of requests that were given up would otherwise live until their number comes again.
+const MAX_COMPLETED: usize = 32;
+/// Bytes that are kept of what comes first from the other end.
+const MAX_HEARD: usize = 256;
 
 /// A request that was accepted; an event will say when it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +50,9 @@ pub struct RemoteController {
     heard_us: u64,
     asked_us: u64,
     heartbeat_us: u64,
+    /// The first request, and the first bytes that came after it: they tell who else is at the other end.
+    greeting: Vec<u8>,
+    heard: Vec<u8>,
 }
 
 impl RemoteController {
@@ -65,9 +73,24 @@ impl RemoteController {
     /// # Errors
     /// No answer.
     pub fn connect_for_service(transport: Box<dyn Transport>, node: u8) -> Result<Self, LinkError> {
+        Self::greet(transport, node, name_of(node))
+    }
+
+    /// As [`Self::connect`], with whichever controller is at the other end. Until it has said which arm it
+    /// is, errors call it by `name`.
+    ///
+    /// # Errors
+    /// No answer, or another protocol.
+    pub fn connect_any(transport: Box<dyn Transport>, name: &str) -> Result<Self, LinkError> {
+        let controller = Self::greet(transport, NODE_ANY, name)?;
+        controller.check_version()?;
+        Ok(controller)
+    }
+
+    fn greet(transport: Box<dyn Transport>, node: u8, name: &str) -> Result<Self, LinkError> {
         let now_us = transport.now_us();
         let mut controller = Self {
-            arm: name_of(node).to_owned(),
+            arm: name.to_owned(),
             transport,
             // A number that the controller has not heard: the µs at which this session began.
             session: now_us as u32,
@@ -83,9 +106,13 @@ impl RemoteController {
             heard_us: now_us,
             asked_us: now_us,
             heartbeat_us: now_us,
+            greeting: Vec::new(),
+            heard: Vec::new(),
         };
-        controller.hello()?;
-        Ok(controller)
+        match controller.hello() {
+            Ok(()) => Ok(controller),
+            Err(error) => Err(controller.who_answers(error)),
+        }
     }
 
     /// Says hello again, after the controller restarted or the cable was out. Returns whether it
@@ -289,11 +316,14 @@ impl RemoteController {
     /// Lets time pass, and reads what arrives.
     pub fn rest(&mut self, for_us: u64) -> Result<(), LinkError> {
         let until_us = self.now_us() + for_us;
-        while self.now_us() < until_us {
-            let wait_us = until_us - self.now_us();
+        loop {
+            // Read once: the clock goes on between two looks at it.
+            let wait_us = until_us.saturating_sub(self.now_us());
+            if wait_us == 0 {
+                return Ok(());
+            }
             self.listen(wait_us, None)?;
         }
-        Ok(())
     }
 
     /// Restarts the host watchdog, if it is due.
@@ -323,6 +353,27 @@ impl RemoteController {
         };
         self.identity = identity;
         Ok(())
+    }
+
+    /// What is at the other end, where it is no controller.
+    fn who_answers(&self, error: LinkError) -> LinkError {
+        let is_no_hello = matches!(
+            error,
+            LinkError::NoAnswer { .. } | LinkError::Confused { .. }
+        );
+        if !is_no_hello || self.heard.is_empty() {
+            return error;
+        }
+        let arm = self.arm.clone();
+        let length = self.greeting.len();
+        let is_echo = length > 0 && self.heard.windows(length).any(|some| some == self.greeting);
+        if is_echo {
+            return LinkError::Echo { arm };
+        }
+        LinkError::Foreign {
+            arm,
+            said: readable(&self.heard),
+        }
     }
 
     /// Whether both speak the same protocol.
@@ -367,12 +418,15 @@ impl RemoteController {
         };
         let packet = packet.to_vec();
         self.send(&packet)?;
+        if self.greeting.is_empty() {
+            self.greeting.clone_from(&packet);
+        }
         // Any request restarts the host watchdog.
         self.heartbeat_us = now_us;
         loop {
             let now_us = self.now_us();
             let wait_us = match self.link.poll(now_us) {
-                NextAction::WaitUntil(due_us) => due_us - now_us,
+                NextAction::WaitUntil(due_us) => due_us.saturating_sub(now_us),
                 NextAction::Repeat(packet) => {
                     let packet = packet.to_vec();
                     // The zero ends whatever a fault has left open at the other end.
@@ -403,7 +457,7 @@ impl RemoteController {
             && request == ticket.request
             && !known
         {
-            self.completed.push_back(Completed {
+            self.keep_completed(Completed {
                 seq: 0,
                 request,
                 outcome,
@@ -430,6 +484,8 @@ impl RemoteController {
         let mut bytes = std::mem::take(&mut self.incoming);
         bytes.clear();
         let received = self.transport.receive(&mut bytes, timeout_us);
+        let room = MAX_HEARD.saturating_sub(self.heard.len());
+        self.heard.extend(bytes.iter().take(room));
         let mut answer = None;
         for &byte in &bytes {
             let Some(packet) = self.decoder.push(byte) else {
@@ -477,7 +533,7 @@ impl RemoteController {
         self.events_lost = self.events_lost.saturating_add(gap);
         self.last_event = Some(seq);
         match event {
-            Message::Completed(completed) => self.completed.push_back(completed),
+            Message::Completed(completed) => self.keep_completed(completed),
             Message::Telemetry(telemetry) => self.telemetry = Some(telemetry),
             Message::Pulse(latch) if self.latches.len() < MAX_LATCHES => {
                 self.latches.push_back(latch)
@@ -485,6 +541,15 @@ impl RemoteController {
             // A fault ends whatever was under way, and that says which fault it was.
             _ => {}
         }
+    }
+
+    fn keep_completed(&mut self, completed: Completed) {
+        // One of the same number is of a request long ago.
+        self.completed.retain(|c| c.request != completed.request);
+        if self.completed.len() >= MAX_COMPLETED {
+            self.completed.pop_front();
+        }
+        self.completed.push_back(completed);
     }
 
     fn confused(&self, what: &'static str) -> LinkError {
@@ -501,6 +566,15 @@ impl RemoteController {
             refusal,
         }
     }
+}
+
+/// The first words of some bytes, for a person.
+fn readable(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let shown = |c: char| if c.is_control() { ' ' } else { c };
+    let words: String = text.chars().map(shown).collect();
+    let line = words.split_whitespace().collect::<Vec<_>>().join(" ");
+    line.chars().take(40).collect()
 }
 
 fn name_of(node: u8) -> &'static str {
@@ -524,5 +598,84 @@ fn no_identity() -> Identity {
         boot_id: 0,
         reset: gonia_protocol::message::ResetReason::Unknown,
         last_panic: Default::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io;
+
+    /// What may be at a port that is not a controller's.
+    struct Other {
+        says: fn(&[u8]) -> Vec<u8>,
+        pending: Vec<u8>,
+        now_us: u64,
+    }
+
+    impl Transport for Other {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.pending.extend((self.says)(bytes));
+            Ok(())
+        }
+
+        fn receive(&mut self, out: &mut Vec<u8>, timeout_us: u64) -> io::Result<()> {
+            self.now_us += timeout_us.max(1);
+            out.append(&mut self.pending);
+            Ok(())
+        }
+
+        fn now_us(&self) -> u64 {
+            self.now_us
+        }
+    }
+
+    #[test]
+    fn silence_an_echo_and_another_device_have_each_their_own_sentence() {
+        let silence: fn(&[u8]) -> Vec<u8> = |_| Vec::new();
+        let echo: fn(&[u8]) -> Vec<u8> = <[u8]>::to_vec;
+        let printer: fn(&[u8]) -> Vec<u8> = |_| b"start\r\nMarlin 2.1.2\r\n".to_vec();
+        let noise: fn(&[u8]) -> Vec<u8> = |_| vec![0xfe, 0x80, 0x00, 0x37];
+        for (says, expected) in [
+            (
+                silence,
+                "light arm: no answer to hello; check power, cable and port",
+            ),
+            (echo, "light arm: what is sent comes back: an echo"),
+            (
+                printer,
+                "light arm: something else answers (\"start Marlin 2.1.2",
+            ),
+            (noise, "and its baud rate"),
+        ] {
+            let other = Other {
+                says,
+                pending: Vec::new(),
+                now_us: 0,
+            };
+            let error = RemoteController::connect_any(Box::new(other), "light arm");
+            let error = error.err().unwrap().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn ends_that_nobody_claims_do_not_live_for_ever() {
+        let sim = gonia_sim::rig::SimRig::new(1, gonia_sim::fault::FaultPlan::default());
+        let port = sim.port(gonia_sim::fault::Arm::Light);
+        let mut arm = RemoteController::connect_any(Box::new(port), "light arm").unwrap();
+        for request in 0..u16::MAX {
+            arm.keep_completed(Completed {
+                seq: 0,
+                request: request % 1000,
+                outcome: gonia_protocol::message::RequestOutcome::Done,
+                encoder_udeg: [0; 2],
+                corrections: [0; 2],
+            });
+        }
+        assert_eq!(arm.completed.len(), MAX_COMPLETED);
+        // The newest stay.
+        let last = (u16::MAX - 1) % 1000;
+        assert!(arm.completed.iter().any(|c| c.request == last));
     }
 }

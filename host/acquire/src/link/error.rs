@@ -21,6 +21,32 @@ pub enum LinkError {
         /// What was asked.
         what: &'static str,
     },
+    /// What is sent comes back.
+    #[error(
+        "{arm}: what is sent comes back: an echo, and no controller; check that RX and TX are not joined, and that the port is the right one"
+    )]
+    Echo {
+        /// Which controller.
+        arm: String,
+    },
+    /// Something else is at the other end.
+    #[error(
+        "{arm}: something else answers (\"{said}\"), and no controller; check that the port is the right one, and its baud rate"
+    )]
+    Foreign {
+        /// Which controller.
+        arm: String,
+        /// Its first words.
+        said: String,
+    },
+    /// Both ports lead to the same arm.
+    #[error(
+        "both ports lead to the {arm}'s controller: set the jumper of the other board (docs/src/guides/arms.md), or give the other port"
+    )]
+    SameArm {
+        /// Which.
+        arm: String,
+    },
     /// The controller speaks another protocol.
     #[error(
         "{arm}: its firmware {firmware} speaks protocol {theirs}, this host {ours}; update the older one"

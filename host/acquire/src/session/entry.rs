@@ -1,11 +1,12 @@
 //! What a line of the journal says.
 
+use crate::session::control::ControlDone;
 use gonia_formats::one_line;
 use gonia_rig::Role;
 use std::fmt;
 
-/// The reason with which a session ends between reference and material, for people and in the journal,
-/// where it tells [`End::AwaitsMaterial`] from another pause.
+/// The reason with which a session ends between reference and material. In a journal of an older program
+/// it tells [`SessionEnd::AwaitsMaterial`] from another pause.
 pub const CHANGE_THE_SAMPLE: &str =
     "the reference is measured: put the material on the target and go on with --resume";
 
@@ -16,13 +17,17 @@ pub enum Entry {
     Start(String),
     /// A pose is done: its frame is on the disk.
     Pose(PoseDone),
-    /// A pose was given up, for now: which, and why.
-    GivenUp(String),
+    /// A pose was given up.
+    GivenUp(GivenUp),
+    /// The session stood still, and the lamp may have changed meanwhile: with the reason.
+    Pause(String),
     /// A control pose was compared with its first take.
-    Control(String),
+    Control(ControlDone),
     /// The poses of later lines are discarded, since the control pose has changed. In the journal:
     /// `void`.
     Discard {
+        /// Of this role; of all of them in a journal of an older program.
+        role: Option<Role>,
         /// From this line of the journal on, counted from 0.
         since: usize,
         /// How the control pose has changed.
@@ -49,6 +54,28 @@ pub struct PoseDone {
     pub crc: u32,
     /// The largest |commanded − encoder| at the trigger, degrees.
     pub pointing_deg: f64,
+    /// Whether its fiducial lines were seen; `None` in a journal of an older program, which did not say.
+    pub has_lines: Option<bool>,
+}
+
+/// A pose that is not measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenUp {
+    /// What lay on the target.
+    pub role: Role,
+    /// The pose's place in the plan.
+    pub index: usize,
+    /// Why.
+    pub why: String,
+    /// A person left it out, for good; otherwise the next program tries it again.
+    pub is_left_out: bool,
+}
+
+impl fmt::Display for GivenUp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (role, why) = (self.role.name(), one_line(&self.why));
+        write!(f, "{role} pose {}: {why}", self.index)
+    }
 }
 
 /// How a program left a session.
@@ -65,7 +92,7 @@ pub enum SessionEnd {
 }
 
 impl SessionEnd {
-    /// Its word in the journal and on the live page. [`End::AwaitsMaterial`] is a pause there.
+    /// Its word on the live page, where [`SessionEnd::AwaitsMaterial`] is a pause.
     pub fn name(self) -> &'static str {
         match self {
             SessionEnd::Finished => "finished",
@@ -74,10 +101,19 @@ impl SessionEnd {
         }
     }
 
+    /// Its word in the journal.
+    fn word(self) -> &'static str {
+        match self {
+            SessionEnd::AwaitsMaterial => "awaits-material",
+            end => end.name(),
+        }
+    }
+
     /// Of a line of the journal.
     fn of_line(word: &str, reason: &str) -> Option<Self> {
         Some(match word {
             "finished" => SessionEnd::Finished,
+            "awaits-material" => SessionEnd::AwaitsMaterial,
             "paused" if reason == CHANGE_THE_SAMPLE => SessionEnd::AwaitsMaterial,
             "paused" => SessionEnd::Paused,
             "failed" => SessionEnd::Failed,
@@ -92,19 +128,29 @@ impl fmt::Display for Entry {
             Entry::Start(text) => write!(f, "start {}", one_line(text)),
             Entry::Pose(pose) => write!(
                 f,
-                "pose {} {} at={} bytes={} crc={:08x} pointing={:.6}",
+                "pose {} {} at={} bytes={} crc={:08x} pointing={:.6}{}",
                 pose.role.name(),
                 pose.index,
                 pose.at,
                 pose.bytes,
                 pose.crc,
-                pose.pointing_deg
+                pose.pointing_deg,
+                match pose.has_lines {
+                    Some(true) => " lines=seen",
+                    Some(false) => " lines=unseen",
+                    None => "",
+                }
             ),
-            Entry::GivenUp(text) => write!(f, "given-up {}", one_line(text)),
-            Entry::Control(text) => write!(f, "control {}", one_line(text)),
-            Entry::Discard { since, why } => write!(f, "void since={since} {}", one_line(why)),
+            Entry::GivenUp(pose) if pose.is_left_out => write!(f, "left-out {pose}"),
+            Entry::GivenUp(pose) => write!(f, "given-up {pose}"),
+            Entry::Pause(text) => write!(f, "pause {}", one_line(text)),
+            Entry::Control(control) => write!(f, "control {control}"),
+            Entry::Discard { role, since, why } => {
+                let role = role.map_or(String::new(), |role| format!("{} ", role.name()));
+                write!(f, "void {role}since={since} {}", one_line(why))
+            }
             Entry::Event(text) => write!(f, "event {}", one_line(text)),
-            Entry::Stop(end, text) => write!(f, "stop {} {}", end.name(), one_line(text)),
+            Entry::Stop(end, text) => write!(f, "stop {} {}", end.word(), one_line(text)),
         }
     }
 }
@@ -116,11 +162,17 @@ impl Entry {
         Some(match kind {
             "start" => Entry::Start(rest.into()),
             "pose" => Entry::Pose(parse_pose(rest)?),
-            "given-up" => Entry::GivenUp(rest.into()),
-            "control" => Entry::Control(rest.into()),
+            "given-up" => Entry::GivenUp(parse_given_up(rest, false)?),
+            "left-out" => Entry::GivenUp(parse_given_up(rest, true)?),
+            "pause" => Entry::Pause(rest.into()),
+            "control" => Entry::Control(ControlDone::parse(rest)?),
             "void" => {
+                let (first, _) = rest.split_once(' ')?;
+                let role = role_of(first);
+                let rest = role.map_or(rest, |role| &rest[role.name().len() + 1..]);
                 let (since, why) = rest.split_once(' ')?;
                 Entry::Discard {
+                    role,
                     since: since.strip_prefix("since=")?.parse().ok()?,
                     why: why.into(),
                 }
@@ -135,15 +187,41 @@ impl Entry {
     }
 }
 
+fn role_of(name: &str) -> Option<Role> {
+    [Role::Material, Role::Reference]
+        .into_iter()
+        .find(|role| role.name() == name)
+}
+
+fn parse_given_up(text: &str, is_left_out: bool) -> Option<GivenUp> {
+    let (role, rest) = text.split_once(" pose ")?;
+    let (index, why) = rest.split_once(": ")?;
+    Some(GivenUp {
+        role: role_of(role)?,
+        index: index.parse().ok()?,
+        why: why.into(),
+        is_left_out,
+    })
+}
+
 fn parse_pose(text: &str) -> Option<PoseDone> {
     let words: Vec<&str> = text.split(' ').collect();
-    let [role, index, at, bytes, crc, pointing] = words[..] else {
-        return None;
+    let (words, lines) = match words[..] {
+        [role, index, at, bytes, crc, pointing] => ([role, index, at, bytes, crc, pointing], None),
+        [role, index, at, bytes, crc, pointing, lines] => {
+            ([role, index, at, bytes, crc, pointing], Some(lines))
+        }
+        _ => return None,
     };
+    let [role, index, at, bytes, crc, pointing] = words;
     Some(PoseDone {
-        role: [Role::Material, Role::Reference]
-            .into_iter()
-            .find(|r| r.name() == role)?,
+        has_lines: match lines {
+            None => None,
+            Some("lines=seen") => Some(true),
+            Some("lines=unseen") => Some(false),
+            Some(_) => return None,
+        },
+        role: role_of(role)?,
         index: index.parse().ok()?,
         at: at.strip_prefix("at=")?.parse().ok()?,
         bytes: bytes.strip_prefix("bytes=")?.parse().ok()?,
@@ -155,6 +233,7 @@ fn parse_pose(text: &str) -> Option<PoseDone> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::control::{ControlComparison, Judgement};
 
     #[test]
     fn every_entry_comes_back_from_its_line() {
@@ -165,13 +244,54 @@ mod tests {
             bytes: 25_743,
             crc: 0x00ab_cdef,
             pointing_deg: 0.004_125,
+            has_lines: None,
+        };
+        let control = ControlDone {
+            role: Role::Reference,
+            index: 3,
+            judgement: Some(Judgement::Drifted),
+            comparison: Some(ControlComparison {
+                ratio: 0.9,
+                scatter: 0.001_25,
+                moved_deg: 0.002,
+            }),
+        };
+        let given_up = GivenUp {
+            role: Role::Material,
+            index: 3,
+            why: "no trigger: twice".into(),
+            is_left_out: false,
         };
         for entry in [
             Entry::Start("gonia 0.1.0".into()),
-            Entry::Pose(pose),
-            Entry::GivenUp("material 3: no trigger".into()),
-            Entry::Control("material 0 ratio=1.001".into()),
+            Entry::Pose(pose.clone()),
+            Entry::Pose(PoseDone {
+                has_lines: Some(true),
+                ..pose.clone()
+            }),
+            Entry::Pose(PoseDone {
+                has_lines: Some(false),
+                ..pose
+            }),
+            Entry::GivenUp(given_up.clone()),
+            Entry::GivenUp(GivenUp {
+                is_left_out: true,
+                ..given_up
+            }),
+            Entry::Pause("held by hand".into()),
+            Entry::Control(control.clone()),
+            Entry::Control(ControlDone {
+                judgement: Some(Judgement::Unconfirmed),
+                comparison: None,
+                ..control
+            }),
             Entry::Discard {
+                role: None,
+                since: 17,
+                why: "the lamp is darker".into(),
+            },
+            Entry::Discard {
+                role: Some(Role::Material),
                 since: 17,
                 why: "the lamp is darker".into(),
             },
@@ -183,6 +303,14 @@ mod tests {
         ] {
             assert_eq!(Entry::parse(&entry.to_string()), Some(entry));
         }
+        // As an older program wrote it.
+        assert_eq!(
+            Entry::parse(&format!("stop paused {CHANGE_THE_SAMPLE}")),
+            Some(Entry::Stop(
+                SessionEnd::AwaitsMaterial,
+                CHANGE_THE_SAMPLE.into()
+            ))
+        );
         for text in ["", "pose", "pose material 1", "stop early now", "dance on"] {
             assert_eq!(Entry::parse(text), None, "{text}");
         }

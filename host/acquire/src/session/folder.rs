@@ -3,16 +3,15 @@
 use crate::session::entry::{Entry, PoseDone, SessionEnd};
 use crate::session::journal::Lines;
 use crate::session::provenance::SessionProvenance;
+use crate::session::state::SessionState;
 use crate::session::{journal, record};
 use gonia_brdf::Pose;
 use gonia_formats::plan_csv::read_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_formats::{FileError, checksum};
-use gonia_pipeline::process::SampledFrame;
+use gonia_pipeline::process::{Outcome, SampledFrame};
 use gonia_protocol::crc32c;
-use gonia_rig::{FrameRow, Rig, Role};
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry as Place;
+use gonia_rig::{FrameRow, Reference, Rig, Role};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -28,14 +27,6 @@ pub const JOURNAL: &str = "journal.log";
 /// The sampled frames.
 pub const FRAMES: &str = "frames.bin";
 
-/// Reference before material: the order in which a session measures them.
-pub type PoseKey = (bool, usize);
-
-/// The place of a pose in a session's order.
-pub fn key(role: Role, index: usize) -> PoseKey {
-    (role == Role::Material, index)
-}
-
 /// A session as it stands on the disk.
 #[derive(Clone, Debug)]
 pub struct SessionFolder {
@@ -44,7 +35,7 @@ pub struct SessionFolder {
     plan: Vec<Pose>,
     provenance: SessionProvenance,
     pub(super) lines: Lines,
-    done: BTreeMap<PoseKey, PoseDone>,
+    state: SessionState,
 }
 
 impl SessionFolder {
@@ -71,26 +62,53 @@ impl SessionFolder {
         check_crc(&folder.join(PLAN), &provenance.plan_crc)?;
         let rig = read_rig(&folder.join(RIG))?;
         let plan = read_plan_csv(&folder.join(PLAN))?;
-        let path = folder.join(JOURNAL);
-        let lines = if path.exists() {
-            journal::read(&path)?
-        } else {
-            // Killed before its first line.
-            Lines {
-                entries: Vec::new(),
-                whole_bytes: 0,
-                torn_bytes: 0,
-            }
-        };
-        let done = poses_done(&path, &lines, plan.len())?;
-        Ok(Self {
+        let table = table_of(&rig).map(|file| folder.join(file));
+        if let (Some(table), Some(crc)) = (table, &provenance.reference_crc) {
+            check_crc(&table, crc)?;
+        }
+        let lines = read_journal(folder)?;
+        let limit = rig.session.clone().unwrap_or_default().drift_limit;
+        let state = replay(&folder.join(JOURNAL), &lines, plan.len(), limit)?;
+        let mut session = Self {
             folder: folder.to_owned(),
             rig,
             plan,
             provenance,
             lines,
-            done,
-        })
+            state,
+        };
+        for role in session.roles() {
+            session.find_baseline(*role)?;
+        }
+        Ok(session)
+    }
+
+    /// A journal of an older program does not say in which frames the fiducial lines were seen: what
+    /// control poses are compared with is the first one that was.
+    fn find_baseline(&mut self, role: Role) -> Result<(), FileError> {
+        if self.state.role(role).baseline().is_some() {
+            return Ok(());
+        }
+        let is_first = |entry: &Entry| {
+            let Entry::Pose(pose) = entry else {
+                return false;
+            };
+            pose.role == role
+                && pose.has_lines.is_none()
+                && self.state.role(role).pose_done(pose.index) == Some(pose)
+                // A damaged frame is none; who reads it says so.
+                && self.frame(pose).is_ok_and(|f| f.report.outcome == Outcome::Locked)
+        };
+        let Some(place) = self.lines.entries.iter().position(is_first) else {
+            return Ok(());
+        };
+        if let Some(Entry::Pose(pose)) = self.lines.entries.get_mut(place) {
+            pose.has_lines = Some(true);
+        }
+        let limit = self.rig.session.clone().unwrap_or_default().drift_limit;
+        let path = self.folder.join(JOURNAL);
+        self.state = replay(&path, &self.lines, self.plan.len(), limit)?;
+        Ok(())
     }
 
     /// Where it is.
@@ -127,28 +145,59 @@ impl SessionFolder {
         }
     }
 
+    /// What the session has come to.
+    pub fn state(&self) -> &SessionState {
+        &self.state
+    }
+
     /// The poses that are done, the reference's first, in the plan's order.
     pub fn done(&self) -> impl Iterator<Item = &PoseDone> {
-        self.done.values()
+        let state = |role| self.state.role(role).done();
+        state(Role::Reference).chain(state(Role::Material))
     }
 
     /// A pose that is done.
     pub fn pose_done(&self, role: Role, index: usize) -> Option<&PoseDone> {
-        self.done.get(&key(role, index))
+        self.state.role(role).pose_done(index)
     }
 
     /// Poses of a role that are not done, in the plan's order.
     pub fn missing(&self, role: Role) -> Vec<usize> {
-        let is_missing = |i: &usize| !self.done.contains_key(&key(role, *i));
-        (0..self.plan.len()).filter(is_missing).collect()
+        self.state.missing(role)
     }
 
     /// How the last program left it; `None` when it was killed, or still runs.
     pub fn end(&self) -> Option<(SessionEnd, &str)> {
-        match self.lines.entries.last() {
-            Some(Entry::Stop(end, reason)) => Some((*end, reason)),
-            _ => None,
+        self.state.end()
+    }
+
+    /// Refuses frames whose lines the journal has lost: a program that died leaves one frame without a
+    /// line at most.
+    ///
+    /// # Errors
+    /// There are more, or the file cannot be read.
+    pub(super) fn check_tail(&self) -> Result<(), FileError> {
+        let path = self.folder.join(FRAMES);
+        let at = self.state.frame_bytes();
+        let Ok(mut file) = File::open(&path) else {
+            return Ok(());
+        };
+        let mut tail = Vec::new();
+        file.seek(SeekFrom::Start(at))
+            .and_then(|_| file.read_to_end(&mut tail))
+            .map_err(|error| FileError::reading(&path, &error))?;
+        let second = record::split_first(&tail).and_then(|(_, rest)| record::split_first(rest));
+        if second.is_none() {
+            return Ok(());
         }
+        Err(FileError::new(
+            &self.folder.join(JOURNAL),
+            format_args!(
+                "has lost lines: {FRAMES} holds {} bytes of whole frames behind the last one that it speaks of",
+                tail.len()
+            ),
+            "restore the whole journal from a copy, or measure in another folder",
+        ))
     }
 
     /// The frame of a pose.
@@ -206,16 +255,6 @@ impl SessionFolder {
         };
         self.done().map(row).collect()
     }
-
-    /// How many bytes of frames the journal vouches for.
-    pub(super) fn frame_bytes(&self) -> u64 {
-        // Also those of discarded poses: nothing may be written over.
-        let ends = self.lines.entries.iter().map(|entry| match entry {
-            Entry::Pose(pose) => pose.at + pose.bytes,
-            _ => 0,
-        });
-        ends.max().unwrap_or(0)
-    }
 }
 
 fn check_crc(path: &Path, expected: &str) -> Result<(), FileError> {
@@ -229,40 +268,48 @@ fn check_crc(path: &Path, expected: &str) -> Result<(), FileError> {
     ))
 }
 
-fn poses_done(
+/// The file beside `rig.toml` that a rig names.
+pub fn table_of(rig: &Rig) -> Option<&str> {
+    match &rig.reference {
+        Some(Reference::Table { file, .. }) => Some(file),
+        _ => None,
+    }
+}
+
+/// The journal. It lies there, if empty, before the folder is a session; where it is gone, the frames
+/// cannot be told apart any more.
+fn read_journal(folder: &Path) -> Result<Lines, FileError> {
+    let path = folder.join(JOURNAL);
+    if path.exists() {
+        return journal::read(&path);
+    }
+    match std::fs::metadata(folder.join(FRAMES)).map_or(0, |m| m.len()) {
+        // An older program, killed before its first line.
+        0 => Ok(Lines::default()),
+        bytes => Err(FileError::new(
+            &path,
+            format_args!("is missing, and {FRAMES} holds {bytes} bytes of frames"),
+            "restore the journal from a copy: without it nobody knows which frames these are; or measure in another folder",
+        )),
+    }
+}
+
+fn replay(
     path: &Path,
     lines: &Lines,
     planned: usize,
-) -> Result<BTreeMap<PoseKey, PoseDone>, FileError> {
-    let mut done: BTreeMap<PoseKey, (usize, PoseDone)> = BTreeMap::new();
+    drift_limit: f64,
+) -> Result<SessionState, FileError> {
+    let mut state = SessionState::new(planned, drift_limit);
     for (i, entry) in lines.entries.iter().enumerate() {
-        let pose = match entry {
-            Entry::Pose(pose) => pose,
-            Entry::Discard { since, .. } => {
-                done.retain(|_, (line, _)| *line < *since);
-                continue;
-            }
-            _ => continue,
-        };
-        let wrong = |what: &str| {
-            let name = format!("{} pose {}", pose.role.name(), pose.index);
+        state.apply(entry).map_err(|contradiction| {
             FileError::new(
                 path,
-                format_args!("{name} {what}"),
+                contradiction,
                 "this is no journal that gonia wrote; measure the session anew",
             )
             .at(format_args!("line {}", i + 1))
-        };
-        if pose.index >= planned {
-            return Err(wrong("is not in the plan"));
-        }
-        match done.entry(key(pose.role, pose.index)) {
-            Place::Vacant(place) => place.insert((i, pose.clone())),
-            Place::Occupied(_) => return Err(wrong("is done twice")),
-        };
+        })?;
     }
-    Ok(done
-        .into_iter()
-        .map(|(key, (_, pose))| (key, pose))
-        .collect())
+    Ok(state)
 }

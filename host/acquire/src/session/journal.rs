@@ -6,16 +6,15 @@
 //! The checksum is of everything before ` #`. Lines are numbered from 0, so that a missing one is
 //! noticed.
 
+use crate::session::append::{AppendLog, LogFile};
 use crate::session::clock;
 use crate::session::entry::Entry;
 use gonia_formats::FileError;
 use gonia_protocol::crc32c;
-use std::fs::{File, OpenOptions};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The lines of a journal, and how many of its bytes are whole lines.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Lines {
     /// What they say.
     pub entries: Vec<Entry>,
@@ -31,6 +30,14 @@ pub struct Lines {
 /// Unreadable, or a line other than that which is not whole.
 pub fn read(path: &Path) -> Result<Lines, FileError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::reading(path, &error))?;
+    lines_of(path, &bytes)
+}
+
+/// The lines of a journal's bytes; the path is for errors.
+///
+/// # Errors
+/// As [`read`].
+pub fn lines_of(path: &Path, bytes: &[u8]) -> Result<Lines, FileError> {
     let mut entries = Vec::new();
     let mut at = 0;
     while let Some(length) = bytes[at..].iter().position(|b| *b == b'\n') {
@@ -71,55 +78,44 @@ fn parse(line: &[u8], number: usize) -> Option<Entry> {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    file: File,
+    log: AppendLog,
     next: usize,
-    whole_bytes: u64,
 }
 
 impl Journal {
-    /// Goes on behind the whole lines of a journal, or begins one.
+    /// Goes on behind the whole lines of a journal.
     ///
     /// # Errors
-    /// When the file cannot be opened, or its torn end not be cut off.
-    pub fn append_to(path: &Path, lines: Option<&Lines>) -> Result<Self, FileError> {
-        let failed = |error| FileError::writing(path, &error);
-        let mut options = OpenOptions::new();
-        let file = options
-            .append(true)
-            .create(true)
-            .open(path)
-            .map_err(failed)?;
-        let (whole_bytes, next) = lines.map_or((0, 0), |l| (l.whole_bytes, l.entries.len()));
-        file.set_len(whole_bytes).map_err(failed)?;
+    /// When its torn end cannot be cut off.
+    pub fn append_to(
+        path: &Path,
+        file: Box<dyn LogFile>,
+        lines: &Lines,
+    ) -> Result<Self, FileError> {
         Ok(Self {
             path: path.to_owned(),
-            file,
-            next,
-            whole_bytes,
+            log: AppendLog::open(path, file, lines.whole_bytes)?,
+            next: lines.entries.len(),
         })
     }
 
-    /// Writes a line and waits until it is on the disk.
+    /// Writes a line and waits until it is on the disk. Returns the entry as it will be read.
     ///
     /// # Errors
     /// When the disk does not take it. The journal is then as it was.
-    pub fn write(&mut self, entry: &Entry) -> Result<(), FileError> {
+    pub fn write(&mut self, entry: &Entry) -> Result<Entry, FileError> {
         let text = format!("{} {} {entry}", self.next, clock::now());
-        let line = format!("{text} #{:08x}\n", crc32c(text.as_bytes()));
-        let written = self.file.write_all(line.as_bytes());
-        if let Err(error) = written.and_then(|()| self.file.sync_data()) {
-            // The next line must not follow half a one.
-            let _ = self.file.set_len(self.whole_bytes);
-            return Err(FileError::writing(&self.path, &error));
-        }
-        self.whole_bytes += line.len() as u64;
+        let line = format!("{text} #{:08x}", crc32c(text.as_bytes()));
+        let entry = parse(line.as_bytes(), self.next).ok_or_else(|| {
+            FileError::new(
+                &self.path,
+                format_args!("has no line for \"{entry}\""),
+                "please report this",
+            )
+        })?;
+        self.log.append(format!("{line}\n").as_bytes())?;
         self.next += 1;
-        Ok(())
-    }
-
-    /// The number of the next line.
-    pub fn next(&self) -> usize {
-        self.next
+        Ok(entry)
     }
 }
 
@@ -128,10 +124,18 @@ mod tests {
     use super::*;
     use crate::session::entry::SessionEnd;
 
+    fn open(path: &Path) -> Journal {
+        let mut options = std::fs::OpenOptions::new();
+        let file = options.write(true).create(true).truncate(false).open(path);
+        let lines = read(path).unwrap();
+        Journal::append_to(path, Box::new(file.unwrap()), &lines).unwrap()
+    }
+
     fn written(n: usize) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("journal.log");
-        let mut journal = Journal::append_to(&path, None).unwrap();
+        std::fs::write(&path, "").unwrap();
+        let mut journal = open(&path);
         for i in 0..n {
             journal.write(&Entry::Event(format!("number {i}"))).unwrap();
         }
@@ -148,7 +152,7 @@ mod tests {
             let whole = bytes[..keep].iter().filter(|b| **b == b'\n').count();
             assert_eq!(lines.entries.len(), whole);
             assert_eq!(lines.whole_bytes + lines.torn_bytes, keep as u64);
-            let mut journal = Journal::append_to(&path, Some(&lines)).unwrap();
+            let mut journal = open(&path);
             journal
                 .write(&Entry::Stop(SessionEnd::Paused, "x".into()))
                 .unwrap();

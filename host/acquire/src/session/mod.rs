@@ -9,21 +9,29 @@
 //! | `lock` | held while a capture runs | – |
 //!
 //! A pose is done when its line is in the journal, and its line is written after its frame is on the
-//! disk. What a killed program leaves behind the last whole line is cut off when it goes on.
+//! disk. What a killed program leaves behind the last whole line is cut off when it goes on. Everything
+//! else that a session knows follows from the journal's entries: [`SessionState`].
 
+mod append;
 mod clock;
+mod control;
 mod entry;
 mod folder;
 mod journal;
 mod provenance;
 pub mod record;
 mod samples;
+#[cfg(test)]
+mod simulation;
+mod state;
 mod verify;
 mod writer;
 
 pub use clock::now;
-pub use entry::{CHANGE_THE_SAMPLE, Entry, PoseDone, SessionEnd};
+pub use control::{ControlComparison, ControlDone, Judgement};
+pub use entry::{CHANGE_THE_SAMPLE, Entry, GivenUp, PoseDone, SessionEnd};
 pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 pub use provenance::{ControllerIdentity, SessionProvenance};
+pub use state::{Contradiction, RoleState, SessionState};
 pub use verify::{Finding, Verdict, verify};
 pub use writer::{Beginning, Claim, SessionWriter};

@@ -17,6 +17,9 @@ pub struct SessionProvenance {
     pub rig_crc: String,
     /// Checksum of `plan.csv`.
     pub plan_crc: String,
+    /// Checksum of the reference's table, if `rig.toml` names one; a session of an older program has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_crc: Option<String>,
     /// Whether the reference is measured over the whole plan before the material.
     pub reference: bool,
     /// The camera, or whatever else the frames come from.

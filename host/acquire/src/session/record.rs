@@ -97,6 +97,12 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
 
 /// The frame of some bytes; `None` when they are no frame.
 pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
+    let (frame, rest) = split_first(bytes)?;
+    rest.is_empty().then_some(frame)
+}
+
+/// The frame with which some bytes begin, and the bytes behind it; `None` when they begin with none.
+pub fn split_first(bytes: &[u8]) -> Option<(SampledFrame, &[u8])> {
     let mut bytes = Bytes(bytes);
     if &bytes.take::<4>()? != MAGIC {
         return None;
@@ -149,11 +155,12 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
         });
     }
     let length = u32::from_le_bytes(bytes.take()?) as usize;
+    let (mask, rest) = bytes.0.split_at_checked(length)?;
     let mask = match length {
         0 => None,
-        _ => Some(Mask::from_bytes(bytes.0.get(..length)?)?),
+        _ => Some(Mask::from_bytes(mask)?),
     };
-    (bytes.0.len() == length).then_some(SampledFrame {
+    let frame = SampledFrame {
         report: FrameReport {
             frame,
             role,
@@ -168,7 +175,8 @@ pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
         view: seen?,
         points,
         mask,
-    })
+    };
+    Some((frame, rest))
 }
 
 /// What is left to read.

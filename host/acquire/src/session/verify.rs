@@ -54,7 +54,6 @@ impl Verdict {
 pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
     let session = SessionFolder::open(folder)?;
     let mut findings = Vec::new();
-    let path = folder.join(JOURNAL);
     if session.lines.torn_bytes > 0 {
         findings.push(Finding::Note(format!(
             "{JOURNAL}: the last {} bytes are the start of a line whose program died",
@@ -81,32 +80,17 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
         }
     }
     let there = std::fs::metadata(folder.join(FRAMES)).map_or(0, |m| m.len());
-    let frame_bytes = session.frame_bytes();
-    if there > frame_bytes {
+    let frame_bytes = session.state().frame_bytes();
+    if let Err(error) = session.check_tail() {
+        findings.push(Finding::Broken(error));
+    } else if there > frame_bytes {
         findings.push(Finding::Note(format!(
             "{FRAMES}: the last {} bytes are a frame whose program died",
             there - frame_bytes
         )));
     }
     check_kept_frames(&session, &mut findings);
-    let missing: usize = session
-        .roles()
-        .iter()
-        .map(|r| session.missing(*r).len())
-        .sum();
-    if let Some((SessionEnd::Finished, _)) = session.end()
-        && missing > 0
-        && !session
-            .journal()
-            .iter()
-            .any(|e| matches!(e, Entry::GivenUp(_)))
-    {
-        findings.push(Finding::Broken(FileError::new(
-            &path,
-            format_args!("says finished, and {missing} poses are missing"),
-            "go on with gonia capture --resume",
-        )));
-    }
+    check_end(&session, &mut findings);
     let entries = session.journal();
     let starts = entries
         .iter()
@@ -127,6 +111,50 @@ pub fn verify(folder: &Path) -> Result<Verdict, FileError> {
         end: session.end().map(|(end, reason)| (end, reason.to_owned())),
         findings,
     })
+}
+
+/// What is left to do, and whether the session says that nothing is.
+fn check_end(session: &SessionFolder, findings: &mut Vec<Finding>) {
+    let path = session.folder().join(JOURNAL);
+    let missing: usize = session
+        .roles()
+        .iter()
+        .map(|r| session.state().to_measure(*r).len())
+        .sum();
+    let left_out: usize = session
+        .roles()
+        .iter()
+        .map(|r| session.state().role(*r).given_up())
+        .sum();
+    if left_out > 0 {
+        findings.push(Finding::Note(format!("{left_out} poses are given up")));
+    }
+    if let Some((SessionEnd::Finished, _)) = session.end()
+        && missing > 0
+    {
+        findings.push(Finding::Broken(FileError::new(
+            &path,
+            format_args!("says finished, and {missing} poses are missing"),
+            "go on with gonia capture --resume",
+        )));
+    }
+    let doubtful = doubtful(session);
+    if let Some((SessionEnd::Finished, _)) = session.end()
+        && doubtful > 0
+    {
+        findings.push(Finding::Broken(FileError::new(
+            &path,
+            format_args!("says finished, and no good control pose stands behind {doubtful} poses"),
+            "go on with gonia capture --resume: it takes the control pose",
+        )));
+    }
+}
+
+/// Poses that a control pose could vouch for, and none does.
+fn doubtful(session: &SessionFolder) -> usize {
+    let roles = session.roles().iter().map(|r| session.state().role(*r));
+    let unvouched = roles.filter(|role| role.baseline().is_some());
+    unvouched.map(|role| role.doubtful().len()).sum()
 }
 
 /// Raw frames, where they are kept.

@@ -8,11 +8,12 @@ use crate::say::errln;
 use crate::{account, remarks, sample_facts, table};
 use anyhow::{Context, Result, bail};
 use gonia_acquire::capture::{
-    ArmPortNames, Ended, Equipment, Orders, UnattendedSession, Watch, Watchers, free_mb, travelling,
+    ArmPortNames, Ended, Equipment, Orders, UnattendedSession, Watch, Watchers, free_mb,
+    keep_apart, travelling,
 };
 use gonia_acquire::session::{
-    Beginning, Claim, ControllerIdentity, Entry, RIG, SessionEnd, SessionFolder, SessionProvenance,
-    SessionWriter,
+    Beginning, Claim, ControllerIdentity, Entry, GivenUp, RIG, SessionEnd, SessionFolder,
+    SessionProvenance, SessionWriter,
 };
 use gonia_brdf::Pose;
 use gonia_formats::frames_csv::write_frames_csv;
@@ -45,6 +46,14 @@ pub struct Capture {
     /// Go on with the session in the folder; begin one if there is none
     #[arg(long)]
     resume: bool,
+    /// Poses to go on without, by their place in the plan, counted from 0
+    #[arg(
+        long,
+        value_name = "POSE,…",
+        value_delimiter = ',',
+        requires = "resume"
+    )]
+    leave_out: Vec<usize>,
     /// Port of the light arm's controller [default: that of rig.toml]
     #[arg(long, value_name = "PORT")]
     light: Option<String>,
@@ -68,7 +77,7 @@ pub struct Capture {
 /// The session's folder, before the controllers are connected.
 enum Folder {
     Fresh(Claim),
-    Begun(SessionWriter),
+    Begun(Box<SessionWriter>),
 }
 
 impl Capture {
@@ -86,7 +95,7 @@ impl Capture {
             Some(address) => Some(Listening::at(address, self.serve_anywhere)?),
             None => None,
         };
-        let (folder, plan) = self.folder_and_plan(&rig_text, beside.map(|b| b.0))?;
+        let (folder, plan) = self.folder_and_plan(&rig, &rig_text, beside.map(|b| b.0))?;
         let orders = Orders::default();
         let on_interrupt = orders.clone();
         ctrlc::set_handler(move || on_interrupt.interrupt())
@@ -102,10 +111,11 @@ impl Capture {
         if let Some(warning) = equipment.arms.calibration_warning()? {
             errln!("warning: {warning}");
         }
+        remarks::print(equipment.arms.exchange_remark().as_slice());
         equipment.check_reach(&plan)?;
         let provenance = provenance_of(&mut equipment, settings.reference);
         let mut writer = match folder {
-            Folder::Begun(writer) => writer,
+            Folder::Begun(writer) => *writer,
             Folder::Fresh(claim) => claim.begin(Beginning {
                 rig: &rig_text,
                 beside,
@@ -119,6 +129,7 @@ impl Capture {
             "{}, light arm {}, camera arm {}",
             provenance.program, provenance.light_arm.config_crc, provenance.camera_arm.config_crc
         )))?;
+        self.leave_out(&mut writer, &session)?;
         if self.keep_frames {
             check_writable(&self.folder.join("frames"))?;
         }
@@ -154,12 +165,13 @@ impl Capture {
     /// The session's folder, locked, and its poses: of the session in it, or of a new one.
     fn folder_and_plan(
         &self,
+        rig: &Rig,
         rig_text: &[u8],
         beside: Option<&str>,
     ) -> Result<(Folder, Vec<Pose>)> {
         if !(self.resume && SessionFolder::is_session(&self.folder)) {
             let claim = Claim::new(&self.folder, beside)?;
-            return Ok((Folder::Fresh(claim), self.fresh_plan()?));
+            return Ok((Folder::Fresh(claim), self.fresh_plan(rig)?));
         }
         let (writer, session) = SessionWriter::resume(&self.folder)?;
         check_same(&self.folder.join(RIG), rig_text, &self.rig)?;
@@ -172,13 +184,44 @@ impl Capture {
                 path.display()
             );
         }
-        Ok((Folder::Begun(writer), plan))
+        Ok((Folder::Begun(Box::new(writer)), plan))
     }
 
-    fn fresh_plan(&self) -> Result<Vec<Pose>> {
+    /// Notes the poses that a person leaves out. A pose that is done stays.
+    fn leave_out(&self, writer: &mut SessionWriter, session: &SessionFolder) -> Result<()> {
+        let planned = session.plan().len();
+        if let Some(index) = self.leave_out.iter().find(|index| **index >= planned) {
+            bail!(
+                "--leave-out {index}: the plan has {planned} poses, counted from 0; see given-up in {}",
+                self.folder.join("journal.log").display()
+            );
+        }
+        for role in session.roles() {
+            for index in writer.state().missing(*role) {
+                if self.leave_out.contains(&index) && !writer.state().role(*role).is_left_out(index)
+                {
+                    writer.note(&Entry::GivenUp(GivenUp {
+                        role: *role,
+                        index,
+                        why: "left out by hand".into(),
+                        is_left_out: true,
+                    }))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn fresh_plan(&self, rig: &Rig) -> Result<Vec<Pose>> {
         let plan = match &self.plan {
             Some(path) => read_plan_csv(path)?,
-            None => travelling(&Rings::paper()).poses,
+            None => {
+                let mut plan = travelling(&Rings::paper());
+                if let Some(arms) = rig.arms.as_ref().filter(|arms| arms.keep_out_deg > 0.0) {
+                    keep_apart(&mut plan, arms.keep_out_deg);
+                }
+                plan.poses
+            }
         };
         if plan.is_empty() {
             bail!("the plan has no pose: make one with gonia plan");
@@ -223,6 +266,7 @@ fn provenance_of(equipment: &mut Equipment, reference: bool) -> SessionProvenanc
         began: String::new(),
         rig_crc: String::new(),
         plan_crc: String::new(),
+        reference_crc: None,
         reference,
         camera: equipment.camera.identity(),
         seed: equipment.seed,
@@ -283,7 +327,7 @@ fn check_equipment(began: &SessionProvenance, now: &SessionProvenance) -> Result
             );
         }
     }
-    if began.camera != now.camera {
+    if !is_same_camera(&began.camera, &now.camera) {
         bail!(
             "the frames come from \"{}\", and those of the session came from \"{}\"; restore [source], or begin a new session",
             now.camera,
@@ -291,6 +335,12 @@ fn check_equipment(began: &SessionProvenance, now: &SessionProvenance) -> Result
         );
     }
     Ok(())
+}
+
+/// An older program kept the path of a folder as it was given.
+fn is_same_camera(began: &str, now: &str) -> bool {
+    let folder = |camera: &str| std::fs::canonicalize(camera.strip_prefix("folder ")?).ok();
+    began == now || folder(began).is_some_and(|began| folder(now) == Some(began))
 }
 
 /// `frames.csv` of the raw frames that are kept, if any are.
@@ -309,7 +359,11 @@ fn list_frames(session: &SessionFolder) -> Result<()> {
 fn describe(session: &SessionFolder, ended: &Ended) -> Vec<(String, String)> {
     let planned = session.roles().len() * session.plan().len();
     let took_s = ended.took.as_secs_f64();
-    let active_s = (ended.took - ended.paused).as_secs_f64().max(1e-9);
+    let active_s = ended
+        .took
+        .saturating_sub(ended.paused)
+        .as_secs_f64()
+        .max(1e-9);
     let mut rows = vec![
         (
             "poses".to_owned(),

@@ -59,6 +59,7 @@ pub fn begin(folder: &Path, rig: &Rig, n: usize) -> SessionWriter {
         began: String::new(),
         rig_crc: String::new(),
         plan_crc: String::new(),
+        reference_crc: None,
         reference: rig.session.as_ref().unwrap().reference,
         camera: "of a test".into(),
         seed: Some(1),

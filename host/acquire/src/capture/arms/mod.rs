@@ -8,9 +8,11 @@ use crate::capture::keep_out::ArmAngles;
 use crate::capture::timing::nearest_turn_deg;
 use crate::link::{HEARTBEAT_US, LinkError, RemoteController, Ticket, Transport, is_uncalibrated};
 use gonia_brdf::Pose;
+use gonia_brdf::direction::angle_between;
 use gonia_protocol::message::{MAX_PULSES, RequestOutcome};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
+use gonia_rig::Remark;
 
 pub use recovery::HomeError;
 
@@ -45,6 +47,8 @@ pub struct Arms {
     pub(super) options: ShotOptions,
     light: RemoteController,
     camera: RemoteController,
+    /// Each was found at the other one's port.
+    is_exchanged: bool,
     phi_limits_deg: [[f64; 2]; 2],
     /// Directions of light and view nearer to each other than this would make the arms touch.
     pub(super) keep_out_deg: f64,
@@ -94,26 +98,54 @@ impl TryError {
     }
 }
 
+/// The angle between the arms at a pose, degrees.
+pub(super) fn pose_apart_deg(pose: &Pose) -> f64 {
+    angle_between(pose.light.to_vec3(), pose.view.to_vec3()).to_degrees()
+}
+
 impl Arms {
-    /// Says hello to both controllers and reads their limits.
+    /// Says hello to both controllers and reads their limits. Each is the arm that it says it is: ports
+    /// that were exchanged are used rightly, and [`Self::exchange_remark`] says so.
     ///
     /// # Errors
-    /// A controller does not answer, or speaks another protocol.
+    /// A controller does not answer, or speaks another protocol; or both are the same arm.
     pub fn connect(
         light: Box<dyn Transport>,
         camera: Box<dyn Transport>,
     ) -> Result<Self, LinkError> {
-        let mut light = RemoteController::connect(light, NODE_LIGHT)?;
-        let mut camera = RemoteController::connect(camera, NODE_CAMERA)?;
+        let light = RemoteController::connect_any(light, "light arm")?;
+        let camera = RemoteController::connect_any(camera, "camera arm")?;
+        let is_exchanged = (light.node(), camera.node()) == (NODE_CAMERA, NODE_LIGHT);
+        let (mut light, mut camera) = if is_exchanged {
+            (camera, light)
+        } else {
+            (light, camera)
+        };
+        if light.node() == camera.node() {
+            let arm = light.name().to_owned();
+            return Err(LinkError::SameArm { arm });
+        }
         let phi_limits_deg = [phi_limits(&mut light)?, phi_limits(&mut camera)?];
         Ok(Self {
             options: ShotOptions::default(),
             light,
             camera,
+            is_exchanged,
             phi_limits_deg,
             keep_out_deg: 0.0,
             must_home: false,
             at_udeg: [[0; 2]; 2],
+        })
+    }
+
+    /// What to say where each arm's controller was found at the other one's port.
+    pub fn exchange_remark(&self) -> Option<Remark> {
+        self.is_exchanged.then(|| {
+            Remark::new(
+                "arms",
+                "the light arm's controller answers at the camera arm's port, and the camera arm's at the light arm's; each is used as what it says it is",
+                "exchange light and camera under [arms] in rig.toml, or --light and --camera-arm",
+            )
         })
     }
 
@@ -266,6 +298,23 @@ impl Arms {
         let mut clear = ways.filter(|targets| self.legs_udeg(*targets).is_some());
         // None: `go` will say so.
         Some(clear.next().unwrap_or(nearest))
+    }
+
+    /// The arm that has no turn for the azimuth of a pose, and that azimuth in degrees, if there is one.
+    pub(super) fn without_turn(&self, pose: &Pose) -> Option<(String, f64)> {
+        let arms = [(&self.light, pose.light), (&self.camera, pose.view)];
+        let limits = arms.into_iter().zip(self.phi_limits_deg);
+        limits
+            .into_iter()
+            .find_map(|((arm, direction), limits_deg)| {
+                let phi_deg = direction.phi_deg();
+                // Whatever the arm comes from: a turn that is nearest from there may be out, another one in.
+                let turns = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|turn| phi_deg + 360.0 * turn);
+                let has_turn = turns
+                    .iter()
+                    .any(|phi_deg| (limits_deg[0]..=limits_deg[1]).contains(phi_deg));
+                (!has_turn).then(|| (arm.name().to_owned(), phi_deg))
+            })
     }
 
     /// The legs of a way to these targets that is clear of the keep-out angle, if there is one.

@@ -4,6 +4,8 @@ use crate::capture::coordinator::{Coordinator, Halt};
 use crate::capture::shooter::Shooter;
 use crate::capture::thermometer;
 use crate::capture::unattended::role_run::RoleRun;
+use crate::capture::watch::SessionEvent;
+use crate::session::Entry;
 use std::time::Instant;
 
 /// While the arms rest, orders are looked for this often, µs.
@@ -41,32 +43,39 @@ impl RoleRun<'_> {
     }
 
     /// Waits while it is too cold or too warm, or the temperature is not known. It is read again only at
-    /// `look_us` by the arms' clock, which this moves on. Returns whether it had to wait.
+    /// `look_us` by the arms' clock, which this moves on. What it has done to the lamp, the control pose
+    /// tells, which comes first then.
     pub(super) fn wait_for_temperature(
         &self,
         shooter: &mut Shooter,
         coordinator: &mut Coordinator,
         look_us: &mut u64,
-    ) -> Result<bool, Halt> {
+    ) -> Result<(), Halt> {
         let settings = self.session.settings;
         let Some(thermometer) = &settings.thermometer else {
-            return Ok(false);
+            return Ok(());
         };
         if shooter.arms().now_us() < *look_us {
-            return Ok(false);
+            return Ok(());
         }
         for tries in 0.. {
             let Err(error) = thermometer::check(thermometer) else {
                 *look_us = shooter.arms().now_us() + (thermometer.every_s * 1e6) as u64;
-                return Ok(tries > 0);
+                return Ok(());
             };
             if tries >= settings.max_retries {
                 return Err(Halt::Failed(format!("{error}: go on with --resume")));
             }
-            coordinator.note(&error.to_string());
+            if tries == 0 {
+                coordinator.write(&Entry::Pause(error.to_string()))?;
+                let text = error.to_string();
+                coordinator.watch.on_event(&SessionEvent::Note(&text));
+            } else {
+                coordinator.note(&error.to_string());
+            }
             self.rest(shooter, coordinator)?;
         }
-        Ok(true)
+        Ok(())
     }
 
     /// A pause by the arms' clock, in which orders are carried out.

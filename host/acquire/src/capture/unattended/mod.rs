@@ -12,9 +12,11 @@ use crate::capture::frame_worker::lock;
 use crate::capture::orders::Orders;
 use crate::capture::shooter::{SessionSummary, Shooter};
 use crate::capture::watch::{SessionEvent, Watch};
-use crate::session::{CHANGE_THE_SAMPLE, Entry, SessionEnd, SessionFolder, SessionWriter};
+use crate::session::{
+    CHANGE_THE_SAMPLE, Entry, SessionEnd, SessionFolder, SessionState, SessionWriter,
+};
+use gonia_brdf::Pose;
 use gonia_formats::FileError;
-use gonia_pipeline::process::{Outcome, SampledFrame};
 use gonia_rig::{Rig, Role, SessionSettings};
 use role_run::{RoleRun, Totals};
 use std::path::{Path, PathBuf};
@@ -62,7 +64,7 @@ impl UnattendedSession<'_> {
     /// Takes all poses that are missing.
     ///
     /// # Errors
-    /// When the folder cannot be read, or the journal's last line not be written.
+    /// When the journal's last line cannot be written.
     pub fn run(
         &self,
         arms: &mut Arms,
@@ -77,15 +79,26 @@ impl UnattendedSession<'_> {
         let mut totals = Totals::default();
         let mut result = self.home(&mut shooter);
         for role in session.roles() {
-            let missing = session.missing(*role);
-            if result.is_err() || missing.is_empty() {
+            let (missing, baseline, is_complete) = {
+                let writer = lock(&writer);
+                let state = writer.state();
+                let baseline = state.role(*role).baseline().cloned();
+                (state.to_measure(*role), baseline, state.is_complete(*role))
+            };
+            if result.is_err() || is_complete {
                 continue;
             }
-            let baseline = baseline_of(session, *role)?;
+            let baseline = match baseline.map(|pose| session.frame(&pose)).transpose() {
+                Ok(frame) => frame,
+                Err(error) => {
+                    result = Err(Halt::Failed(error.to_string()));
+                    continue;
+                }
+            };
             let changed = *role == Role::Reference
                 || baseline.is_some()
                 || !session.provenance().reference
-                || has_awaited_material(session);
+                || lock(&writer).state().has_awaited_material();
             if !changed && !lock(&camera).changes_the_sample() {
                 result = Err(Halt::AwaitsMaterial);
                 continue;
@@ -107,17 +120,15 @@ impl UnattendedSession<'_> {
                 (missing, baseline),
                 &mut totals,
             );
+            // While the reference still lies there.
+            if result.is_ok() && *role == Role::Reference && !lock(&camera).changes_the_sample() {
+                result = if_none_is_given_up(lock(&writer).state(), &[Role::Reference]);
+            }
         }
-        let (end, reason) = how_it_ended(&result, totals.given_up);
-        if matches!(result, Err(Halt::Stopped(_))) {
-            // They have been stopped already; this is for a stop that did not arrive.
-            let _ = shooter.arms().stop();
-        } else if matches!(end, SessionEnd::Finished | SessionEnd::Failed)
-            && let Some(first) = session.plan().first()
-        {
-            // A fault that ended the session may forbid it; then they stay where they are.
-            let _ = shooter.park(first);
-        }
+        let result =
+            result.and_then(|()| if_none_is_given_up(lock(&writer).state(), session.roles()));
+        let (end, reason) = how_it_ended(&result);
+        rest_arms(&mut shooter, &result, session.plan().first());
         let took = began.elapsed();
         let ended = Ended {
             end,
@@ -142,37 +153,45 @@ impl UnattendedSession<'_> {
     }
 }
 
+/// Leaves the arms where a session that ended so leaves them: at its first pose, or where they are.
+fn rest_arms(shooter: &mut Shooter, result: &Result<(), Halt>, first: Option<&Pose>) {
+    match (result, first) {
+        (Err(Halt::Stopped(_)), _) => {
+            // They have been stopped already; this is for a stop that did not arrive.
+            let _ = shooter.arms().stop();
+        }
+        (Ok(()) | Err(Halt::Failed(_)), Some(first)) => {
+            // A fault that ended the session may forbid it; then they stay where they are.
+            let _ = shooter.park(first);
+        }
+        _ => {}
+    }
+}
+
+/// A session does not finish without poses that nobody left out.
+fn if_none_is_given_up(state: &SessionState, roles: &[Role]) -> Result<(), Halt> {
+    let missing: usize = roles
+        .iter()
+        .map(|role| {
+            let is_left_out = |index: &usize| state.role(*role).is_left_out(*index);
+            let missing = state.missing(*role);
+            missing.iter().filter(|index| !is_left_out(index)).count()
+        })
+        .sum();
+    match missing {
+        0 => Ok(()),
+        _ => Err(Halt::Failed(format!(
+            "{missing} poses could not be reached: --resume tries them again, --resume --leave-out POSE,… goes on without them"
+        ))),
+    }
+}
+
 /// The state in which a session ends, and the reason, for people.
-fn how_it_ended(result: &Result<(), Halt>, given_up: usize) -> (SessionEnd, String) {
+fn how_it_ended(result: &Result<(), Halt>) -> (SessionEnd, String) {
     match result {
-        Ok(()) if given_up > 0 => (
-            SessionEnd::Failed,
-            format!("{given_up} poses could not be reached"),
-        ),
         Ok(()) => (SessionEnd::Finished, "every pose is done".to_owned()),
         Err(Halt::Paused(why) | Halt::Stopped(why)) => (SessionEnd::Paused, why.clone()),
         Err(Halt::AwaitsMaterial) => (SessionEnd::AwaitsMaterial, CHANGE_THE_SAMPLE.to_owned()),
         Err(Halt::Failed(why)) => (SessionEnd::Failed, why.clone()),
     }
-}
-
-/// Whether a session ended once so that a person would change the sample. One that was killed between
-/// reference and material did not.
-fn has_awaited_material(session: &SessionFolder) -> bool {
-    let awaits = |entry: &Entry| matches!(entry, Entry::Stop(SessionEnd::AwaitsMaterial, _));
-    session.journal().iter().any(awaits)
-}
-
-/// The first pose whose fiducial lines were seen, and its frame.
-fn baseline_of(
-    session: &SessionFolder,
-    role: Role,
-) -> Result<Option<(usize, SampledFrame)>, FileError> {
-    for pose in session.done().filter(|pose| pose.role == role) {
-        let frame = session.frame(pose)?;
-        if frame.report.outcome == Outcome::Locked {
-            return Ok(Some((pose.index, frame)));
-        }
-    }
-    Ok(None)
 }

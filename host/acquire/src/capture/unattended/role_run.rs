@@ -3,7 +3,8 @@
 use crate::camera::{Camera, Pulse};
 use crate::capture::arms::HomeError;
 use crate::capture::coordinator::{Channels, Coordinator, Halt};
-use crate::capture::frame_worker::{FrameWorker, Taken, Task, fetch_all, lock};
+use crate::capture::course::{Step, next_step};
+use crate::capture::frame_worker::{FrameWorker, Taken, Task, fetch_all};
 use crate::capture::shooter::{SessionError, Shooter};
 use crate::capture::shot::ShotOutcome;
 use crate::capture::unattended::UnattendedSession;
@@ -25,8 +26,6 @@ const LISTEN_EVERY: Duration = Duration::from_millis(50);
 /// What the roles of a session add up to.
 #[derive(Default)]
 pub(super) struct Totals {
-    /// Poses given up.
-    pub given_up: usize,
     /// Shots taken again because of the camera or the disk.
     pub retaken: u32,
     /// Time by the host's clock in which the session paused.
@@ -60,13 +59,13 @@ impl From<SessionError> for NoShot {
 }
 
 impl RoleRun<'_> {
-    /// Takes the poses that are missing. `baseline` is the pose that control takes are compared with,
-    /// and its frame, once there is one.
+    /// Takes the poses that are missing. `baseline` is the frame that control takes are compared with, once
+    /// there is one.
     pub fn measure(
         &self,
         shooter: &mut Shooter,
         (camera, writer): (&Mutex<Box<dyn Camera>>, &Mutex<SessionWriter>),
-        (missing, baseline): (Vec<usize>, Option<(usize, SampledFrame)>),
+        (missing, baseline): (Vec<usize>, Option<SampledFrame>),
         totals: &mut Totals,
     ) -> Result<(), Halt> {
         let settings = self.session.settings;
@@ -84,13 +83,12 @@ impl RoleRun<'_> {
             self.session.watch,
             self.session.orders,
             channels,
-            settings.exposures_s.len(),
+            (self.role, settings.exposures_s.len()),
             (
                 settings.max_retries,
                 Duration::from_secs_f64(settings.pause_s),
             ),
         );
-        coordinator.control = baseline.as_ref().map(|(index, _)| *index);
         coordinator
             .queue
             .extend(missing.into_iter().map(|index| Task {
@@ -103,7 +101,7 @@ impl RoleRun<'_> {
             has_reference: self.has_reference,
             writer,
             frames: self.session.keep_frames.clone(),
-            baseline: baseline.map(|(_, frame)| frame),
+            baseline,
             watch: self.session.watch,
         };
         std::thread::scope(|scope| {
@@ -112,7 +110,7 @@ impl RoleRun<'_> {
                 fetch_all(camera, &to_fetch, &work, &tell_too);
             });
             scope.spawn(move || worker.work(&to_do, &tell));
-            let mut result = self.take_all(shooter, &mut coordinator, totals);
+            let mut result = self.take_all(shooter, &mut coordinator);
             if let Err(Halt::Paused(_)) = result {
                 // The last frame is kept as any other.
                 result = coordinator.close_last_shot().and(result);
@@ -126,43 +124,32 @@ impl RoleRun<'_> {
         })
     }
 
-    fn take_all(
-        &self,
-        shooter: &mut Shooter,
-        coordinator: &mut Coordinator,
-        totals: &mut Totals,
-    ) -> Result<(), Halt> {
-        let mut good_line = lock(coordinator.writer).next_line();
-        if coordinator.control.is_some() {
-            self.check_control(shooter, coordinator, good_line)?;
-        }
+    fn take_all(&self, shooter: &mut Shooter, coordinator: &mut Coordinator) -> Result<(), Halt> {
+        let every = self.session.settings.control_every;
         let mut look_us = 0;
         loop {
             coordinator.handle_events()?;
             self.obey(shooter, coordinator)?;
             self.wait_for_room(shooter, coordinator)?;
-            let was_out = self.wait_for_temperature(shooter, coordinator, &mut look_us)?;
-            // What it has done to the lamp, the control pose tells.
-            let due =
-                was_out || coordinator.since_control.len() >= self.session.settings.control_every;
-            if due || coordinator.queue.is_empty() {
-                coordinator.close_last_shot()?;
-                coordinator.wait_for_worker()?;
-                // Frames that came to nothing are in the queue again.
-                if !due && !coordinator.queue.is_empty() {
-                    continue;
+            self.wait_for_temperature(shooter, coordinator, &mut look_us)?;
+            let is_queue_empty = coordinator.queue.is_empty();
+            let is_under_way = coordinator.is_under_way();
+            let step = self.state(coordinator, |state| {
+                next_step(state, every, is_queue_empty, is_under_way)
+            });
+            match step {
+                Step::Done => return Ok(()),
+                Step::Settle => {
+                    coordinator.close_last_shot()?;
+                    coordinator.wait_for_worker()?;
                 }
-                // Also the last poses have a control behind them.
-                if !coordinator.since_control.is_empty() {
-                    self.check_control(shooter, coordinator, good_line)?;
-                    coordinator.since_control.clear();
-                    good_line = lock(coordinator.writer).next_line();
+                Step::Control(index) => self.take_control(shooter, coordinator, index)?,
+                Step::Pose => {
+                    if let Some(task) = coordinator.queue.pop_front() {
+                        self.shoot(shooter, coordinator, task)?;
+                    }
                 }
             }
-            let Some(task) = coordinator.queue.pop_front() else {
-                return Ok(());
-            };
-            self.shoot(shooter, coordinator, task, totals)?;
         }
     }
 
@@ -178,7 +165,11 @@ impl RoleRun<'_> {
             // then loses no frame.
             coordinator.close_last_shot()?;
             coordinator.wait_for_worker()?;
-            coordinator.note("held by hand");
+            // The lamp may be another one after it: the control pose comes first then.
+            coordinator.write(&Entry::Pause("held by hand".into()))?;
+            coordinator
+                .watch
+                .on_event(&SessionEvent::Note("held by hand"));
             coordinator.watch.on_event(&SessionEvent::Held(true));
             let began = Instant::now();
             while orders.is_held() && !orders.ends() {
@@ -209,7 +200,6 @@ impl RoleRun<'_> {
         shooter: &mut Shooter,
         coordinator: &mut Coordinator,
         task: Task,
-        totals: &mut Totals,
     ) -> Result<(), Halt> {
         let Some(pose) = self.plan.get(task.index) else {
             return Ok(());
@@ -253,12 +243,7 @@ impl RoleRun<'_> {
                     let tries = task.tries + 1;
                     coordinator.queue.push_back(Task { tries, ..task });
                 } else {
-                    coordinator.watch.on_event(&SessionEvent::GivenUp {
-                        index: task.index,
-                        why: &text,
-                    });
-                    let _ = lock(coordinator.writer).note(&Entry::GivenUp(text));
-                    totals.given_up += 1;
+                    coordinator.give_up(task.index, reason)?;
                 }
                 Ok(())
             }
