@@ -40,7 +40,7 @@ impl Import {
     pub fn run(self) -> Result<()> {
         let grid =
             Grid::with_step_deg(self.step).with_context(|| format!("--step {}", self.step))?;
-        let ForeignFormat { name, content } = foreign_format(&self.material)?;
+        let ForeignFormat { name, content, .. } = foreign_format(&self.material)?;
         match content {
             ForeignContent::Brdf { scale, read } => {
                 let scale = self.scale_of(name, *scale)?;
