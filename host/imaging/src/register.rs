@@ -43,6 +43,8 @@ const LOOSE_ARM_DEG: f64 = 0.5;
 const LOOSE_ROLL_DEG: f64 = 1.0;
 /// Standard deviation of ln magnification where focal length or distance are not what rig.toml says.
 const LOOSE_LN_SCALE: f64 = 0.02;
+/// What the model is trusted to then, in frame widths.
+const LOOSE_MODEL_WIDTHS: f64 = 5e-4;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
@@ -503,13 +505,19 @@ impl Registrar {
         predicted: &Homography,
         within_widths: f64,
     ) -> Option<CameraShift> {
-        // Arms that hold their angles first: what is beside them says less of the image.
-        let trusts = [ARM_DEG, LOOSE_ARM_DEG].map(|arm_deg| Trust {
+        // The least that explains it first: a moved image; a camera that looks elsewhere or is nearer, whose
+        // perspective is another too; and an arm that is off as well.
+        let moved = |arm_deg| Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
-            ln_scale: LOOSE_LN_SCALE,
             ..self.trust(arm_deg)
-        });
+        };
+        let another = |arm_deg| Trust {
+            ln_scale: LOOSE_LN_SCALE,
+            model_px: (LOOSE_MODEL_WIDTHS * frame.width as f64).max(5.0 * MODEL_PX),
+            ..moved(arm_deg)
+        };
+        let trusts = [moved(ARM_DEG), another(ARM_DEG), another(LOOSE_ARM_DEG)];
         let found = self.elsewhere(frame, view, predicted, within_widths, &trusts)?;
         Some(found.estimate.shift)
     }

@@ -3,10 +3,10 @@
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::numbers::NumberState;
 use crate::calibrate::shading::{
-    LN_INTENSITY, LN_INTENSITY_PRIOR, OWN, ShadedFrame, Shading, ln_intensity, target_unknowns,
-    thin,
+    LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, OWN, ReferenceShape, ShadedFrame, Shading,
+    ln_intensity, target_unknowns, thin,
 };
-use crate::calibrate::solve::{Problem, Solved, solve};
+use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
 use crate::calibrate::{are_free, covariance_of, priors, states};
 use gonia_rig::Rig;
@@ -17,6 +17,8 @@ const FEWEST: usize = 6;
 /// Standard deviation of a frame's level, or of values within a frame, beyond which a reference does not
 /// scatter as it is thought to (relative).
 const NOT_AS_THOUGHT: f64 = 0.02;
+/// Values within a frame may differ by so many times their noise, however large that is.
+const NOISES: f64 = 3.0;
 
 /// What became of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,24 +83,29 @@ impl Light {
             };
             return Ok(Self::left(state));
         }
-        thin(&mut frames);
+        let reference = ReferenceShape::of(rig);
+        thin(&mut frames, reference);
+        let shading = Shading {
+            rig,
+            frames: &frames,
+        };
         let level = ln_intensity(rig, &frames);
-        let nominal = nominal(rig, level);
-        let prior = with_target(rig);
-        let everything = free(&[true; LIGHT.len()]);
-        let all = solve_light(rig, &frames, &nominal, &prior, &everything)?;
+        let nominal = nominal(rig, level, reference);
+        let prior = with_target(rig, reference);
+        let unlike = |solved: &Solved, within| LightState::ReferenceUnlike {
+            level: solved.own[2],
+            within,
+        };
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
+        let everything = free(&[true; LIGHT.len()], prior.len());
+        let all = solve_light(&shading, &nominal, &prior, &everything)?;
         let within = all.noise * typical;
-        if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT {
-            let level = all.own[2];
-            return Ok(Self::left(LightState::ReferenceUnlike { level, within }));
+        if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
+            return Ok(Self::left(unlike(&all, within)));
         }
         let covariance = joined(camera, &all.information, &prior)?;
-        let at = CAMERA.len();
-        let own = covariance
-            .view((at, at), (LIGHT.len(), LIGHT.len()))
-            .into_owned();
-        let light = LIGHT.len();
+        let (at, light) = (CAMERA.len(), LIGHT.len());
+        let own = covariance.view((at, at), (light, light)).into_owned();
         let states = states(
             &LIGHT,
             &nominal[..light],
@@ -106,23 +113,18 @@ impl Light {
             &all.shared,
             &own,
         );
-        let kept = free(&are_free(&states));
-        let solved = solve_light(rig, &frames, &nominal, &prior, &kept)?;
-        let found = with_values(&LIGHT, rig, &solved.shared[..light]);
-        let misfit = |rig: &Rig, level: f64| {
-            median(
-                frames
-                    .iter()
-                    .map(|frame| frame.misfit(rig, level))
-                    .collect(),
-            )
+        let kept = free(&are_free(&states), prior.len());
+        let solved = solve_light(&shading, &nominal, &prior, &kept)?;
+        // What the light was thought to be, with the intensity and the reference that fit it best.
+        let held = free(&[false; LIGHT.len()], prior.len());
+        let before = solve_light(&shading, &nominal, &prior, &held)?;
+        let misfit = |solved: &Solved| {
+            let at = shading.at(&solved.shared);
+            median(frames.iter().map(|frame| frame.misfit(&at)).collect())
         };
         let state = LightState::Found {
             frames: frames.len(),
-            shading: [
-                misfit(rig, level),
-                misfit(&found, solved.shared[LN_INTENSITY]),
-            ],
+            shading: [misfit(&before), misfit(&solved)],
             lamp: solved.own[2],
             arm_deg: [solved.own[0], solved.own[1]],
         };
@@ -162,32 +164,33 @@ impl Light {
     }
 }
 
-/// Where the shared numbers start: the light's, the target's, the intensity's.
-fn nominal(rig: &Rig, level: f64) -> Vec<f64> {
+/// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.
+fn nominal(rig: &Rig, level: f64, reference: ReferenceShape) -> Vec<f64> {
     let mut nominal = values(&LIGHT, rig);
     nominal.extend(values(target_unknowns(), rig));
     nominal.push(level);
+    nominal.resize(nominal.len() + reference.priors().len(), 0.0);
     nominal
 }
 
-fn with_target(rig: &Rig) -> Vec<f64> {
+fn with_target(rig: &Rig, reference: ReferenceShape) -> Vec<f64> {
     let mut prior = priors(&LIGHT, rig);
     prior.extend(priors(target_unknowns(), rig));
     prior.push(LN_INTENSITY_PRIOR);
+    prior.extend(reference.priors());
     prior
 }
 
-/// The target's numbers are those of the lines.
-fn free(light: &[bool]) -> Vec<bool> {
+/// The target's numbers are those of the lines; intensity and reference are nobody else's.
+fn free(light: &[bool], count: usize) -> Vec<bool> {
     let mut free = light.to_vec();
     free.extend([false; TARGET]);
-    free.push(true);
+    free.resize(count, true);
     free
 }
 
 fn solve_light(
-    rig: &Rig,
-    frames: &[ShadedFrame],
+    shading: &Shading<'_>,
     nominal: &[f64],
     prior: &[f64],
     free: &[bool],
@@ -197,19 +200,20 @@ fn solve_light(
         prior,
         free,
         own: &OWN,
+        least_own: &LEAST_OWN,
         finds_noise: true,
     };
-    solve(&Shading { rig, frames }, &problem, nominal).ok_or(CalibrateError::NoSolution)
+    solve(shading, &problem, nominal).ok_or(CalibrateError::NoSolution)
 }
 
 /// The covariance of camera, target and light together. With N the information of shading and l, t the
-/// numbers of light (and intensity) and target, l follows a change of t by G = −N_ll⁻¹ N_lt.
+/// numbers of light (with intensity and reference) and target, l follows a change of t by G = −N_ll⁻¹ N_lt.
 fn joined(
     camera: &DMatrix<f64>,
     information: &DMatrix<f64>,
     prior: &[f64],
 ) -> Result<DMatrix<f64>, CalibrateError> {
-    let light: Vec<usize> = (0..LIGHT.len()).chain([LN_INTENSITY]).collect();
+    let light: Vec<usize> = (0..LIGHT.len()).chain(LN_INTENSITY..prior.len()).collect();
     let pick = |of: &[usize]| {
         DMatrix::from_fn(light.len(), of.len(), |i, j| information[(light[i], of[j])])
     };

@@ -10,6 +10,17 @@ use gonia_rig::{CameraModel, CameraShift, FrameRow, Rig};
 /// each line's own place (pixels: what the model of its brightness leaves).
 pub const OWN: [f64; 6] = [0.03, 0.03, 0.05, 0.05, 0.05, 0.05];
 
+/// The least that they are taken to be: no arm repeats better, and no line is modelled better.
+pub const LEAST_OWN: [f64; 6] = [0.005, 0.005, 0.02, 0.02, 0.02, 0.02];
+
+/// What the places of all lines may have in common, outwards: so many pixels, and so many over the square of
+/// the gap between line and material in pixels (the model of their brightness is an idealised one). Standard
+/// deviations of two shared numbers behind the camera's.
+pub const BIAS: [f64; 2] = [0.02, 0.02];
+
+/// A gap is taken to be no narrower than this, pixels.
+const NARROWEST_GAP_PX: f64 = 0.5;
+
 /// A residual of a point that the camera cannot see, standard deviations: as good as none.
 const NOWHERE: f64 = 1e6;
 
@@ -31,17 +42,19 @@ pub struct Lines<'a> {
 }
 
 impl Frames for Lines<'_> {
-    type At = CameraModel;
+    type At = (CameraModel, [f64; 2]);
 
     fn count(&self) -> usize {
         self.frames.len()
     }
 
-    fn at(&self, shared: &[f64]) -> CameraModel {
-        CameraModel::new(&with_values(&CAMERA, self.rig, shared))
+    fn at(&self, shared: &[f64]) -> Self::At {
+        let (camera, bias) = shared.split_at(CAMERA.len());
+        let rig = with_values(&CAMERA, self.rig, camera);
+        (CameraModel::new(&rig), [bias[0], bias[1]])
     }
 
-    fn residuals(&self, camera: &CameraModel, frame: usize, own: &[f64]) -> Vec<f64> {
+    fn residuals(&self, (camera, bias): &Self::At, frame: usize, own: &[f64]) -> Vec<f64> {
         let frame = &self.frames[frame];
         let a = self.rig.target.line_offset_mm;
         let by = CameraShift {
@@ -50,9 +63,13 @@ impl Frames for Lines<'_> {
             ..CameraShift::default()
         };
         let off = distances_px(camera, a, frame.row.pose.view, by, &frame.points);
+        let target = &self.rig.target;
+        let gap_mm = a - target.material_half_mm - 0.5 * target.line_width_mm;
         let of_point = |(point, off): (&LinePoint, f64)| {
             let line = 2 * point.axis + usize::from(point.sign > 0.0);
-            let residual = (off - own[2 + line]) / point.u_px;
+            let gap_px = (gap_mm * point.px_per_mm).max(NARROWEST_GAP_PX);
+            let common = bias[0] + bias[1] / (gap_px * gap_px);
+            let residual = (off - common - own[2 + line]) / point.u_px;
             if residual.is_finite() {
                 residual.clamp(-NOWHERE, NOWHERE)
             } else {

@@ -23,6 +23,7 @@ mod unknowns;
 pub use error::CalibrateError;
 pub use light::LightState;
 pub use numbers::{Number, NumberState, Spread};
+pub use unknowns::number_of;
 
 use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
 use crate::progress::{Cancelled, Progress, Step, step};
@@ -116,8 +117,6 @@ pub fn calibrate(
 struct Seen {
     lines: Vec<LineFrame>,
     shaded: Vec<ShadedFrame>,
-    /// The camera that they were found with.
-    rig: Rig,
     checksum: String,
     remarks: Vec<Remark>,
 }
@@ -226,12 +225,11 @@ fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, Cal
         };
         (lines, shaded, checksum::of_frame(frame))
     })?;
-    gather(looked, camera)
+    gather(looked)
 }
 
 fn gather(
     looked: Looked<(LineFrame, Option<ShadedFrame>, String)>,
-    camera: Rig,
 ) -> Result<Seen, CalibrateError> {
     let (total, mut lost, mut first_error) = (looked.len(), 0, None);
     let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
@@ -262,7 +260,6 @@ fn gather(
     Ok(Seen {
         lines,
         shaded,
-        rig: camera,
         checksum: checksum::of_bytes(sums.as_bytes()),
         remarks,
     })
@@ -296,15 +293,26 @@ fn solve_camera(
     free: &[bool],
     finds_noise: bool,
 ) -> Result<Solved, CalibrateError> {
-    let nominal = values(&CAMERA, rig);
+    let mut nominal = values(&CAMERA, rig);
+    nominal.extend([0.0; lines::BIAS.len()]);
+    let mut free = free.to_vec();
+    free.extend([true; lines::BIAS.len()]);
     let problem = Problem {
         nominal: &nominal,
-        prior: &priors(&CAMERA, rig),
-        free,
+        prior: &camera_priors(rig),
+        free: &free,
         own: &lines::OWN,
+        least_own: &lines::LEAST_OWN,
         finds_noise,
     };
     solve(&Lines { rig, frames }, &problem, &nominal).ok_or(CalibrateError::NoSolution)
+}
+
+/// Of the camera's numbers and of what lines have in common.
+fn camera_priors(rig: &Rig) -> Vec<f64> {
+    let mut prior = priors(&CAMERA, rig);
+    prior.extend(lines::BIAS);
+    prior
 }
 
 /// The inverse of data's information and the priors', in the numbers' own units.
@@ -413,7 +421,10 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let nominal = values(&CAMERA, rig);
     let prior = priors(&CAMERA, rig);
     let all = solve_camera(rig, &lines, &[true; CAMERA.len()], true)?;
-    let covariance = covariance_of(&all.information, &prior)?;
+    let covariance = covariance_of(&all.information, &camera_priors(rig))?;
+    let covariance = covariance
+        .view((0, 0), (CAMERA.len(), CAMERA.len()))
+        .into_owned();
     let camera_states = states(&CAMERA, &nominal, &prior, &all.shared, &covariance);
     let camera = solve_camera(rig, &lines, &are_free(&camera_states), true)?;
     let with_camera = with_values(&CAMERA, rig, &camera.shared);
@@ -429,8 +440,11 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         &covariance,
         &camera_states,
     );
-    let (mut unknowns, mut shared, mut covariance) =
-        (vec![&CAMERA[..]], camera.shared.clone(), covariance);
+    let (mut unknowns, mut shared, mut covariance) = (
+        vec![&CAMERA[..]],
+        camera.shared[..CAMERA.len()].to_vec(),
+        covariance,
+    );
     if let Some(light) = light.solution() {
         let prior = priors(&LIGHT, rig);
         let own = light

@@ -3,8 +3,9 @@
 use crate::calibrate::solve::Frames;
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, Unknown, with_values};
 use crate::process::SampledFrame;
+use crate::process::central::{n_terms, terms};
 use crate::process::reflectance::KnownReference;
-use gonia_brdf::{Direction, Elementary};
+use gonia_brdf::{Direction, Elementary, Vec3};
 use gonia_imaging::{IdealLight, SamplingGrid};
 use gonia_rig::{CameraModel, Rig};
 use std::f64::consts::PI;
@@ -13,23 +14,39 @@ use std::f64::consts::PI;
 /// the logarithm of the lamp's intensity.
 pub const OWN: [f64; 3] = [0.03, 0.03, 0.01];
 
+/// The least that they are taken to be: no arm repeats better, and no lamp.
+pub const LEAST_OWN: [f64; 3] = [0.005, 0.005, 1e-4];
+
 /// The index of the logarithm of the lamp's intensity, behind the light's and the target's numbers.
 pub const LN_INTENSITY: usize = LIGHT.len() + TARGET;
 /// Its standard deviation: nothing is known of it.
 pub const LN_INTENSITY_PRIOR: f64 = 10.0;
+/// Degree of the polynomials (those of eq. (3)'s central field) that an unknown reference is described by,
+/// and the standard deviation of their coefficients.
+const DEGREE: usize = 2;
+const COEFFICIENT_PRIOR: f64 = 0.5;
 /// Points at which the light is lower than this (cosine of its angle from the normal) tell of it no more
 /// than of themselves: a fibre's shadow is as long as a sample.
 const LOWEST_COSINE: f64 = 0.05;
 /// Points used, of all frames: more cost time and bring nothing.
 const MOST_POINTS: usize = 120_000;
+/// The same with an unknown reference, whose coefficients cost as much as all other numbers.
+const MOST_POINTS_UNKNOWN: usize = 40_000;
 /// The least noise that a value is taken to have, relative.
 const LEAST_NOISE: f64 = 2e-4;
 /// Frames with fewer points than this tell nothing.
 const FEWEST_POINTS: usize = 20;
 
-/// A point of a frame: where on the target it is, mm, and the logarithm of its radiance over its
-/// reflectance factor.
-type ShadedPoint = ([f64; 2], f64);
+/// A point of a frame.
+#[derive(Clone, Copy, Debug)]
+struct ShadedPoint {
+    /// Where on the target it is, mm.
+    at_mm: [f64; 2],
+    /// The unit vector towards the camera.
+    to_camera: Vec3,
+    /// The logarithm of its radiance over its reflectance factor.
+    ln: f64,
+}
 
 /// Values of the reference in one frame.
 #[derive(Clone, Debug)]
@@ -42,12 +59,40 @@ pub struct ShadedFrame {
 }
 
 /// Values of the reference in frames of a rig. The shared numbers are those of the light, those of the
-/// target, and the logarithm of the intensity.
+/// target, the logarithm of the intensity, and the coefficients of an unknown reference.
 pub struct Shading<'a> {
     /// The rig whose numbers are replaced.
     pub rig: &'a Rig,
     /// At least one frame.
     pub frames: &'a [ShadedFrame],
+}
+
+/// What is known of the reference's reflectance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReferenceShape {
+    /// All but a factor.
+    Known,
+    /// That it is smooth and reciprocal: the logarithm is a polynomial whose coefficients are shared numbers
+    /// too, behind the intensity's.
+    Smooth,
+}
+
+impl ReferenceShape {
+    /// Of a rig's reference.
+    pub fn of(rig: &Rig) -> Self {
+        match rig.reference {
+            Some(_) => Self::Known,
+            None => Self::Smooth,
+        }
+    }
+
+    /// Prior standard deviations of the coefficients; the constant is the intensity's.
+    pub fn priors(self) -> Vec<f64> {
+        match self {
+            Self::Known => Vec::new(),
+            Self::Smooth => vec![COEFFICIENT_PRIOR; n_terms(DEGREE) - 1],
+        }
+    }
 }
 
 /// The target's numbers.
@@ -68,16 +113,21 @@ impl ShadedFrame {
             let at = [0, 1].map(|k| at[k] + f64::from(point.offset_mm[k]));
             let to_light = light.direction_from(at);
             let value = f64::from(point.rgb.iter().sum::<f32>());
+            let to_camera = camera.direction_from(at);
             let factor = match &known {
                 Some(known) => {
-                    let of = known.at(to_light, camera.direction_from(at));
+                    let of = known.at(to_light, to_camera);
                     PI * f64::from(of.iter().sum::<f32>())
                 }
                 None => 1.0,
             };
             if to_light[2] > LOWEST_COSINE && value > 0.0 && factor > 0.0 {
                 let ln = (value / factor).natural_log();
-                points.push((at, ln));
+                points.push(ShadedPoint {
+                    at_mm: at,
+                    to_camera,
+                    ln,
+                });
                 row.push((i, ln));
             }
         }
@@ -107,20 +157,35 @@ impl ShadedFrame {
         let mut all: Vec<f64> = self
             .points
             .iter()
-            .map(|(at, ln)| ln - ln_irradiance(light, *at))
+            .map(|p| p.ln - ln_irradiance(light, p.at_mm))
             .collect();
         let middle = all.len() / 2;
         *all.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// RMS of ln radiance about a rig's light, whatever its intensity.
-    pub fn misfit(&self, rig: &Rig, ln_intensity: f64) -> f64 {
+    /// RMS of ln radiance about what light and reference make of it, for shared numbers of a [`Shading`].
+    pub fn misfit(&self, (rig, rest): &(Rig, Vec<f64>)) -> f64 {
         let light = IdealLight::new(rig, self.light);
-        let squares = self.points.iter().map(|(at, ln)| {
-            let off = ln - ln_irradiance(&light, *at) - ln_intensity;
-            off * off
-        });
-        (squares.sum::<f64>() / self.points.len() as f64).sqrt()
+        let off = self.off(&light, rest);
+        (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt()
+    }
+
+    /// ln radiance minus what light and reference make of it; `rest` are intensity and coefficients.
+    fn off(&self, light: &IdealLight, rest: &[f64]) -> Vec<f64> {
+        let mut row = Vec::new();
+        let of_point = |p: &ShadedPoint| {
+            let mut off = p.ln - ln_irradiance(light, p.at_mm) - rest[0];
+            if rest.len() > 1 {
+                terms(DEGREE, light.direction_from(p.at_mm), p.to_camera, &mut row);
+                // The constant, 1, is the intensity's.
+                let field = row.iter().zip(rest).skip(1);
+                off -= field
+                    .map(|(term, coefficient)| term * coefficient)
+                    .sum::<f64>();
+            }
+            off
+        };
+        self.points.iter().map(of_point).collect()
     }
 }
 
@@ -141,9 +206,13 @@ fn noise_of(row: &[(usize, f64)]) -> f64 {
 }
 
 /// Thins frames to what is worth computing.
-pub fn thin(frames: &mut [ShadedFrame]) {
+pub fn thin(frames: &mut [ShadedFrame], reference: ReferenceShape) {
+    let most = match reference {
+        ReferenceShape::Known => MOST_POINTS,
+        ReferenceShape::Smooth => MOST_POINTS_UNKNOWN,
+    };
     let points: usize = frames.iter().map(|frame| frame.points.len()).sum();
-    let step = points.div_ceil(MOST_POINTS).max(1);
+    let step = points.div_ceil(most).max(1);
     frames.iter_mut().for_each(|frame| frame.thin(step));
 }
 
@@ -163,29 +232,29 @@ fn ln_irradiance(light: &IdealLight, at: [f64; 2]) -> f64 {
 }
 
 impl Frames for Shading<'_> {
-    type At = (Rig, f64);
+    type At = (Rig, Vec<f64>);
 
     fn count(&self) -> usize {
         self.frames.len()
     }
 
-    fn at(&self, shared: &[f64]) -> (Rig, f64) {
+    fn at(&self, shared: &[f64]) -> (Rig, Vec<f64>) {
         let (light, target) = shared.split_at(LIGHT.len());
         let rig = with_values(&LIGHT, self.rig, light);
         let rig = with_values(target_unknowns(), &rig, &target[..TARGET]);
-        (rig, shared[LN_INTENSITY])
+        (rig, shared[LN_INTENSITY..].to_vec())
     }
 
-    fn residuals(&self, (rig, level): &(Rig, f64), frame: usize, own: &[f64]) -> Vec<f64> {
+    fn residuals(&self, (rig, rest): &(Rig, Vec<f64>), frame: usize, own: &[f64]) -> Vec<f64> {
         let frame = &self.frames[frame];
         let reading = Direction {
             theta: frame.light.theta + own[0].to_radians(),
             phi: frame.light.phi + own[1].to_radians(),
         };
         let light = IdealLight::new(rig, reading);
-        let of_point = |(at, ln): &ShadedPoint| {
-            (ln - ln_irradiance(&light, *at) - level - own[2]) / frame.noise
-        };
-        frame.points.iter().map(of_point).collect()
+        let mut off = frame.off(&light, rest);
+        off.iter_mut()
+            .for_each(|off| *off = (*off - own[2]) / frame.noise);
+        off
     }
 }

@@ -22,8 +22,6 @@ const BEFORE_NOISE: usize = 4;
 const LONGEST: f64 = 1.5;
 /// Step of numeric derivatives, likewise.
 const DERIVATIVE: f64 = 1e-4;
-/// The least standard deviation of a frame's own number, as a share of where it starts.
-const LEAST_OWN: f64 = 1e-3;
 
 /// What frames show, as a function of the numbers.
 pub trait Frames: Sync {
@@ -50,6 +48,8 @@ pub struct Problem<'a> {
     pub free: &'a [bool],
     /// Standard deviations of a frame's own numbers (about 0), to start from.
     pub own: &'a [f64],
+    /// The least that they are taken to be: few frames seem to have none.
+    pub least_own: &'a [f64],
     /// Whether noise and frames' own standard deviations are found too.
     pub finds_noise: bool,
 }
@@ -121,7 +121,7 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
                     .map(|(own, frame)| own[j] * own[j] + frame.own_variance[j] * had[j] * had[j])
                     .sum::<f64>()
                     / own.len() as f64;
-                *sd = mean.sqrt().max(LEAST_OWN * problem.own[j]);
+                *sd = mean.sqrt().max(problem.least_own[j]);
             }
         }
         let steady = own_sd
@@ -296,6 +296,7 @@ mod tests {
                 prior: &[10.0, 10.0],
                 free: &[true, true],
                 own: &[0.1],
+                least_own: &[1e-3],
                 finds_noise: true,
             };
             let solved = solve(&Lines { seen }, &problem, &[0.0, 0.0]).unwrap();

@@ -90,6 +90,12 @@ pub const LIGHT: [Unknown; 11] = [
     unknown("light.beam[4]", WhenNeeded, |_| 3.0, |r| &mut r.light.beam[4]),
 ];
 
+/// A number of a rig by its key in `rig.toml`, where a calibration knows it: `camera.centre_px[0]`.
+pub fn number_of(rig: &Rig, name: &str) -> Option<f64> {
+    let unknown = CAMERA.iter().chain(&LIGHT).find(|u| u.name == name)?;
+    Some(*(unknown.of)(&mut rig.clone()))
+}
+
 /// The numbers of a rig.
 pub fn values(unknowns: &[Unknown], rig: &Rig) -> Vec<f64> {
     let mut rig = rig.clone();

@@ -165,13 +165,14 @@ fn weighted_mean(points: &[(Vec3, Vec3, [f64; 3])], light: Vec3, view: Vec3) -> 
 /// Quantities of a pair of directions that do not change when they are exchanged.
 const VARIABLES: usize = 6;
 
-fn n_terms(degree: usize) -> usize {
+/// Their number.
+pub(crate) fn n_terms(degree: usize) -> usize {
     // Monomials of at most this degree in six variables.
     [1, 7, 28, 84][degree]
 }
 
-/// The monomials, lower degrees first.
-fn terms(degree: usize, light: Vec3, view: Vec3, row: &mut Vec<f64>) {
+/// The monomials, lower degrees first; the first one is 1.
+pub(crate) fn terms(degree: usize, light: Vec3, view: Vec3, row: &mut Vec<f64>) {
     let h = normalize([light[0] + view[0], light[1] + view[1], light[2] + view[2]]);
     let u: [f64; VARIABLES] = [
         light[2] + view[2],
