@@ -151,6 +151,19 @@ impl FillOptions {
                 "must be 0 or more, or inf".into(),
             );
         }
+        self.check_together(grid)?;
+        Ok((grid, settings))
+    }
+
+    /// Whether the options go together.
+    fn check_together(&self, grid: Grid) -> Result<(), Error> {
+        let refuse = |option, found: String, remedy: String| {
+            Err(Error::Option {
+                option,
+                found,
+                remedy,
+            })
+        };
         let by_rows = format!(
             "not on a grid of {} degrees, which is filled row by row; leave it out",
             self.step_deg
@@ -179,7 +192,7 @@ impl FillOptions {
         if grid.n_cells() > CELLS_IN_MEMORY && !is_blocks {
             return refuse("--method", self.step_deg.to_string(), by_rows);
         }
-        Ok((grid, settings))
+        Ok(())
     }
 
     /// Whether the grid fits memory: [`fill`] makes it then, and [`fill_to_file`] otherwise.
