@@ -9,10 +9,12 @@ use crate::lossless_jpeg;
 use crate::raw_file::{FileSensor, RawFile, wrong_size};
 use crate::tiff_tags::{Directory, Tiff};
 use gonia_rig::{Bayer, RawFrame};
+use std::fs::File;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// The tag that makes a TIFF a DNG.
-pub(super) const VERSION: u16 = 50_706;
+const VERSION: u16 = 50_706;
 /// `PhotometricInterpretation` of a mosaic, and of values that belong to a pixel each.
 const MOSAIC: u64 = 32_803;
 const LINEAR: u64 = 34_892;
@@ -27,6 +29,41 @@ type Unusable = (String, &'static str);
 
 const DAMAGED: &str = "copy or make it again";
 const CONVERT: &str = "convert it to a DNG whose raw image is uncompressed or lossless JPEG, without other corrections";
+
+/// Whether the first directory of a TIFF says that it is a DNG.
+///
+/// # Errors
+/// When the file cannot be read; what is cut short is no DNG.
+pub(super) fn is_one(path: &Path) -> Result<bool, FileError> {
+    match first_tags(path) {
+        Ok(tags) => Ok(tags.contains(&VERSION)),
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
+        Err(error) => Err(FileError::reading(path, &error)),
+    }
+}
+
+/// The numbers of the tags in the first directory of a classic TIFF.
+fn first_tags(path: &Path) -> std::io::Result<Vec<u16>> {
+    let mut file = File::open(path)?;
+    let mut head = [0; 8];
+    file.read_exact(&mut head)?;
+    let short = |b: [u8; 2]| match head[0] {
+        b'M' => u16::from_be_bytes(b),
+        _ => u16::from_le_bytes(b),
+    };
+    let at = [head[4], head[5], head[6], head[7]];
+    let at = match head[0] {
+        b'M' => u32::from_be_bytes(at),
+        _ => u32::from_le_bytes(at),
+    };
+    file.seek(SeekFrom::Start(at.into()))?;
+    let mut count = [0; 2];
+    file.read_exact(&mut count)?;
+    let mut entries = vec![0; 12 * usize::from(short(count))];
+    file.read_exact(&mut entries)?;
+    let entries = entries.chunks_exact(12);
+    Ok(entries.map(|entry| short([entry[0], entry[1]])).collect())
+}
 
 /// Reads the raw image of a DNG, which must be of the camera's size.
 pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, FileError> {
@@ -391,8 +428,8 @@ fn noise_of(profile: &[f64]) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use super::read as read_raw;
     use super::*;
-    use crate::raw_frame::read_raw;
 
     /// A tag: number, type, number of values, and their bytes.
     type Tag = (u16, u16, u32, Vec<u8>);
@@ -548,6 +585,7 @@ mod tests {
         ];
         for (k, bytes) in files.into_iter().enumerate() {
             std::fs::write(&path, &bytes).unwrap();
+            assert!(is_one(&path).unwrap());
             let file = read_raw(&path, 6, 4).unwrap();
             assert_eq!(file.raw.counts, expected(), "{k}");
             let sensor = file.sensor.unwrap();
@@ -567,6 +605,25 @@ mod tests {
                 assert_eq!(error.lines().count(), 1, "{k} {keep}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn the_raw_image_may_be_the_first_of_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.dng");
+        let mut tags = mosaic(16, 1);
+        let data = little(&counts());
+        tags.extend([
+            (VERSION, 1, 4, vec![1, 4, 0, 0]),
+            longs(273, &[8]),
+            longs(279, &[data.len() as u32]),
+        ]);
+        let at = 8 + data.len();
+        let head = [&b"II*\0"[..], &(at as u32).to_le_bytes()].concat();
+        std::fs::write(&path, [head, data, directory(at, tags)].concat()).unwrap();
+        assert!(is_one(&path).unwrap());
+        assert_eq!(read_raw(&path, 6, 4).unwrap().raw.counts, expected());
+        assert_eq!(exposure_s(&path).unwrap(), None);
     }
 
     #[test]

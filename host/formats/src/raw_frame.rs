@@ -4,7 +4,7 @@
 pub use crate::raw_file::{FileSensor, RawFile};
 
 use crate::raw_file::camera_raw;
-use crate::{FileError, raw_png, raw_tiff};
+use crate::{FileError, dng, raw_png, raw_tiff};
 use gonia_rig::RawFrame;
 use png::{BitDepth, ColorType};
 use std::fs::File;
@@ -44,6 +44,9 @@ pub fn read_raw(path: &Path, width: usize, height: usize) -> Result<RawFile, Fil
         return raw_png::read(path, width, height);
     }
     if TIFF.iter().any(|magic| head.starts_with(magic)) {
+        if dng::is_one(path)? {
+            return dng::read(path, width, height);
+        }
         return raw_tiff::read(path, width, height);
     }
     if head.starts_with(EXR) {

@@ -1,7 +1,7 @@
 //! Raw exposures as TIFF: grey or RGB of 8 or 16 bits, one image a file.
 
 use crate::raw_file::{RawFile, wrong_size};
-use crate::{FileError, dng, encoding};
+use crate::{FileError, encoding};
 use gonia_rig::RawFrame;
 use std::fs::File;
 use std::io::BufReader;
@@ -38,10 +38,6 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<RawFile, 
     };
     let file = File::open(path).map_err(|error| FileError::reading(path, &error))?;
     let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?;
-    let version = decoder.find_tag(Tag::Unknown(dng::VERSION));
-    if version.map_err(broken)?.is_some() {
-        return dng::read(path, width, height);
-    }
     let mut limits = Limits::default();
     // Three channels of two bytes, which is all that is ever asked of it.
     limits.decoding_buffer_size = 6 * width * height + ROOM;
