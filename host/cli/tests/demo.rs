@@ -14,6 +14,7 @@ use gonia_rig::{Rig, Scale, Stratum};
 use std::collections::HashSet;
 use std::path::Path;
 
+// long: one demo, and every command that its files serve.
 #[test]
 fn the_quick_demo_measures_the_fabric_and_its_files_serve_every_command() {
     let folder = tempfile::tempdir().unwrap();

@@ -114,25 +114,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
     };
     let tests = Tests::new(data, TESTS);
     if tests.numbers.len() < TESTS_MIN {
-        let unasked = if one_azimuth {
-            Symmetry::Isotropic
-        } else {
-            Symmetry::None
-        };
-        return Choice {
-            settings: Settings {
-                symmetry: asked.unwrap_or(unasked),
-                ..Settings::DEFAULT
-            },
-            reason: if reason == Reason::Shown {
-                Reason::TooFew
-            } else {
-                reason
-            },
-            log_error: None,
-            contradicted_by: None,
-            error_factor: UNTESTED_FACTOR,
-        };
+        return untested(asked, one_azimuth, reason);
     }
     let symmetries: &[Symmetry] = match asked {
         Some(Symmetry::Isotropic | Symmetry::Turns) => &[Symmetry::Isotropic, Symmetry::Turns],
@@ -179,16 +161,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
     }
     let contradicted_by = asked
         .filter(|symmetry| *symmetry != Symmetry::None)
-        .and_then(|_| {
-            let settings = Settings {
-                symmetry: Symmetry::None,
-                ..best.settings
-            };
-            let without = tests.trial(settings);
-            (worse(&best, &without, usual)
-                || best.settings.symmetry.is_isotropic() && tests.shows_azimuth(&best))
-            .then_some(without.error)
-        });
+        .and_then(|_| contradiction(&tests, &best, usual));
     Choice {
         settings: best.settings,
         reason,
@@ -196,6 +169,38 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
         contradicted_by,
         error_factor: best.factor(),
     }
+}
+
+/// What is taken of too few data to test anything by.
+fn untested(asked: Option<Symmetry>, one_azimuth: bool, reason: Reason) -> Choice {
+    let unasked = if one_azimuth {
+        Symmetry::Isotropic
+    } else {
+        Symmetry::None
+    };
+    let reason = if reason == Reason::Shown {
+        Reason::TooFew
+    } else {
+        reason
+    };
+    let settings = Settings {
+        symmetry: asked.unwrap_or(unasked),
+        ..Settings::DEFAULT
+    };
+    Choice {
+        reason,
+        ..Choice::of(settings)
+    }
+}
+
+/// The error without the symmetry that was asked for, where the data contradict that.
+fn contradiction(tests: &Tests, best: &Trial, usual: f64) -> Option<f64> {
+    let without = tests.trial(Settings {
+        symmetry: Symmetry::None,
+        ..best.settings
+    });
+    let shows_azimuth = || best.settings.symmetry.is_isotropic() && tests.shows_azimuth(best);
+    (worse(best, &without, usual) || shows_azimuth()).then_some(without.error)
 }
 
 /// The first, in order of simplicity, that the data do not contradict.
