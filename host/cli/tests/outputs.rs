@@ -495,7 +495,7 @@ fn promise_gigabytes(dense: &Path, path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
-// long: a table, one entry a case.
+// long: a list of cases, one after the other
 fn outputs(bench: &mut Bench) {
     fs::create_dir(bench.at("there")).unwrap();
     fs::write(bench.at("file"), "x").unwrap();
