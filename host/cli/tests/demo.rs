@@ -25,7 +25,6 @@ fn the_quick_demo_measures_the_fabric_and_its_files_serve_every_command() {
         "direction error",
         "bins filled",
         "interior",
-        "report.html",
     ];
     for word in words {
         assert!(table.contains(word), "{word} is missing from\n{table}");
