@@ -41,10 +41,6 @@ const MAX_DEVIATION: f64 = 6.0;
 const LOOSE_ARM_DEG: f64 = 0.5;
 /// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
 const LOOSE_ROLL_DEG: f64 = 1.0;
-/// Standard deviation of ln magnification where focal length or distance are not what rig.toml says.
-const LOOSE_LN_SCALE: f64 = 0.02;
-/// What the model is trusted to then, in frame widths.
-const LOOSE_MODEL_WIDTHS: f64 = 5e-4;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
@@ -505,32 +501,24 @@ impl Registrar {
         predicted: &Homography,
         within_widths: f64,
     ) -> Option<CameraShift> {
-        // The least that explains it first: a moved image; a camera that looks elsewhere or is nearer, whose
-        // perspective is another too; and an arm that is off as well.
-        let moved = |arm_deg| Trust {
+        let trust = Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
-            ..self.trust(arm_deg)
+            ..self.trust(ARM_DEG)
         };
-        let another = |arm_deg| Trust {
-            ln_scale: LOOSE_LN_SCALE,
-            model_px: (LOOSE_MODEL_WIDTHS * frame.width as f64).max(5.0 * MODEL_PX),
-            ..moved(arm_deg)
-        };
-        let trusts = [moved(ARM_DEG), another(ARM_DEG), another(LOOSE_ARM_DEG)];
-        let found = self.elsewhere(frame, view, predicted, within_widths, &trusts)?;
+        let found = self.elsewhere(frame, view, predicted, within_widths, &trust)?;
         Some(found.estimate.shift)
     }
 
-    /// The four lines within so many frame widths of their predictions, where a camera within one of
-    /// `trusts` sees them: the first one's before the next one's.
+    /// The four lines within so many frame widths of their predictions, where a camera within `trust` sees
+    /// them.
     fn elsewhere(
         &self,
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
         within_widths: f64,
-        trusts: &[Trust],
+        trust: &Trust,
     ) -> Option<Elsewhere> {
         let width = frame.width as f64;
         let search_px = within_widths * width + 4.0;
@@ -545,15 +533,19 @@ impl Registrar {
             }
             some
         });
-        let choices: Vec<_> = choices.rev().collect();
-        let tries = trusts
-            .iter()
-            .flat_map(|trust| choices.iter().map(move |some| (trust, some)));
-        tries.into_iter().find_map(|(trust, some)| {
+        choices.rev().find_map(|some| {
             if some.iter().flatten().count() < MIN_LINES {
                 return None;
             }
-            let guess = self.estimate(view, &strips, some, trust).shift;
+            let mut guess = self.estimate(view, &strips, &some, trust).shift;
+            if trust.arm_deg <= ARM_DEG {
+                // An arm that holds its angle: what is left of the guess is noise at grazing views.
+                guess = CameraShift {
+                    shift_px: guess.shift_px,
+                    roll: guess.roll,
+                    ..CameraShift::default()
+                };
+            }
             let there = self.camera.predict(view, guess);
             let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
             let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
