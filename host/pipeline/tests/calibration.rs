@@ -240,7 +240,7 @@ fn frames_that_cannot_tell_are_refused_in_one_line() {
             "{error}"
         );
     };
-    refused(&source(rows[..4].to_vec()), "4 frames show the target");
+    refused(&source(rows[..4].to_vec()), "there are 4");
     let mut alike = rows.clone();
     for (i, row) in alike.iter_mut().enumerate() {
         row.pose.view = Direction::from_deg(30.0 + i as f64 * 0.1, 60.0);

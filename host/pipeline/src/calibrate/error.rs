@@ -11,7 +11,7 @@ pub enum CalibrateError {
     Frames(ProcessError),
     /// Fewer frames than a calibration needs show the target.
     #[error(
-        "{frames} frames show the target, and a calibration needs {needed}: take some at other poses of the camera"
+        "a calibration needs {needed} frames that show the target, and there are {frames}: take some at other poses of the camera"
     )]
     TooFew {
         /// Frames there are.
