@@ -39,7 +39,7 @@ pub enum CalibrateError {
     },
     /// Frames contradict each other.
     #[error(
-        "the lines of {misfits} of {frames} frames do not fit the camera that the others fit (frame {frame} by {misfit_px:.1} pixels): frames of two rigs, or a rig that was moved; calibrate each part by itself"
+        "the lines of {misfits} of {frames} frames do not fit one camera (frame {frame} by {misfit_px:.1} pixels): frames of two rigs, or a rig that was moved; calibrate each part by itself"
     )]
     TwoRigs {
         /// Frames that do not fit.
