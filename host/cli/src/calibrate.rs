@@ -3,7 +3,7 @@
 use crate::progress::Progress;
 use crate::say::outln;
 use crate::{remarks, table};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use gonia_acquire::session::{RIG, now};
 use gonia_brdf::Elementary;
 use gonia_formats::{CaptureFolder, check_output, rig_toml};
@@ -34,7 +34,8 @@ impl Calibrate {
         }
         let progress = Progress::new();
         let folder = CaptureFolder::open(&self.folder)?;
-        let mut calibrated = calibrate(folder.rig(), &folder, &progress.watch())?;
+        let mut calibrated = calibrate(folder.rig(), &folder, &progress.watch())
+            .with_context(|| self.folder.display().to_string())?;
         if let Some(calibration) = &mut calibrated.rig.calibration {
             calibration.date = now();
         }

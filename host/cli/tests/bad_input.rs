@@ -100,6 +100,25 @@ fn broken_capture_folders_are_refused_with_the_place_and_leave_no_samples() {
 }
 
 #[test]
+fn a_folder_that_does_not_show_the_target_gives_no_rig() {
+    let dir = tempfile::tempdir().unwrap();
+    let (dir, found) = (dir.path(), dir.path().join("found.toml"));
+    folder(dir);
+    let calibrate = |words: &[&str]| {
+        let said = refused(&["calibrate", text(dir), "-o", text(&found)], "");
+        assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        assert!(!found.exists());
+    };
+    calibrate(&["needs 6 frames", "there are 1"]);
+    let mut rows = fs::read_to_string(dir.join("frames.csv")).unwrap();
+    for i in 1..8 {
+        rows += &format!("{i},material,0,0,{},{},0.exr\n", 8 * i, 40 * i);
+    }
+    fs::write(dir.join("frames.csv"), rows).unwrap();
+    calibrate(&["none of the 8 frames", "fiducial lines"]);
+}
+
+#[test]
 fn a_frame_of_something_else_gives_no_samples() {
     let dir = tempfile::tempdir().unwrap();
     folder(dir.path());

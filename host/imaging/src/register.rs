@@ -506,19 +506,24 @@ impl Registrar {
             roll_deg: LOOSE_ROLL_DEG,
             ..self.trust(ARM_DEG)
         };
-        let found = self.elsewhere(frame, view, predicted, within_widths, &trust)?;
+        let moved = |guess: CameraShift| CameraShift {
+            shift_px: guess.shift_px,
+            roll: guess.roll,
+            ..CameraShift::default()
+        };
+        let found = self.elsewhere(frame, view, predicted, within_widths, (&trust, &moved))?;
         Some(found.estimate.shift)
     }
 
     /// The four lines within so many frame widths of their predictions, where a camera within `trust` sees
-    /// them.
+    /// them. `taken` says what of a first guess is taken for where they are looked at closely.
     fn elsewhere(
         &self,
         frame: &Frame,
         view: Direction,
         predicted: &Homography,
         within_widths: f64,
-        trust: &Trust,
+        (trust, taken): (&Trust, &dyn Fn(CameraShift) -> CameraShift),
     ) -> Option<Elsewhere> {
         let width = frame.width as f64;
         let search_px = within_widths * width + 4.0;
@@ -537,15 +542,7 @@ impl Registrar {
             if some.iter().flatten().count() < MIN_LINES {
                 return None;
             }
-            let mut guess = self.estimate(view, &strips, &some, trust).shift;
-            if trust.arm_deg <= ARM_DEG {
-                // An arm that holds its angle: what is left of the guess is noise at grazing views.
-                guess = CameraShift {
-                    shift_px: guess.shift_px,
-                    roll: guess.roll,
-                    ..CameraShift::default()
-                };
-            }
+            let guess = taken(self.estimate(view, &strips, &some, trust).shift);
             let there = self.camera.predict(view, guess);
             let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
             let fit = fit_lines(&strips, &Starts::Predicted, &self.target);

@@ -179,9 +179,9 @@ fn describe(found: &Calibrated, truth: &Rig) -> String {
 
 #[test]
 fn a_rig_that_is_off_in_everything_is_found_from_small_frames() {
-    let truth = crooked(200, 1.0, 3);
-    let source = Rendered::new(&truth, random_rows(Role::Reference, 48, 1), 0.01);
-    let found = run(&source, 200).unwrap();
+    let truth = crooked(240, 1.0, 3);
+    let source = Rendered::new(&truth, random_rows(Role::Reference, 60, 1), 0.01);
+    let found = run(&source, 240).unwrap();
     let said = describe(&found, &truth);
     let [light, view] = errors(&found.rig, &truth);
     assert!(matches!(found.light, LightState::Found { .. }), "{said}");
@@ -203,8 +203,8 @@ fn a_calibrated_rig_is_calibrated_again_to_the_same() {
     let source = Rendered::new(&truth, random_rows(Role::Reference, 30, 2), 0.0);
     let once = run(&source, 160).unwrap();
     let twice = calibrate(&once.rig, &source, &silent).unwrap();
-    for spread in twice.changes {
-        assert!(spread.p95 < 0.02, "{:?}", twice.changes);
+    for (spread, u) in twice.changes.iter().zip(&once.direction_u) {
+        assert!(spread.p95 < 2.0 * u.p95, "{spread:?} {u:?}");
     }
     assert!(once.changes[0].p95 > 0.2, "{:?}", once.changes);
 }
@@ -240,7 +240,7 @@ fn frames_that_cannot_tell_are_refused_in_one_line() {
             "{error}"
         );
     };
-    refused(&source(rows[..4].to_vec()), "4 frames show the target");
+    refused(&source(rows[..4].to_vec()), "there are 4");
     let mut alike = rows.clone();
     for (i, row) in alike.iter_mut().enumerate() {
         row.pose.view = Direction::from_deg(30.0 + i as f64 * 0.1, 60.0);
@@ -263,7 +263,7 @@ fn frames_that_cannot_tell_are_refused_in_one_line() {
     for (i, frame) in others.frames.into_iter().enumerate().skip(14) {
         mixed.frames[i] = frame;
     }
-    refused(&mixed, "do not fit the camera that the others fit");
+    refused(&mixed, "do not fit one camera");
 }
 
 /// `cargo test -p gonia-pipeline --test calibration -- --ignored --nocapture`: fifty rigs, some minutes.

@@ -55,6 +55,15 @@ pub struct TargetPlace {
 }
 
 impl ArmGeometry {
+    /// The shafts' true angles when the encoders read `reading`. At the pole the azimuth is the shaft's, which
+    /// the direction of what it holds does not tell.
+    pub fn shaft(&self, reading: Direction) -> Direction {
+        Direction {
+            theta: reading.theta + self.theta_zero_deg.to_radians(),
+            phi: reading.phi + self.phi_zero_deg.to_radians(),
+        }
+    }
+
     /// Where the arm holds something `distance_mm` from its θ axis when it reads `reading`, seen from the
     /// target. With all numbers zero: at d·distance, right (−sin φ, cos φ, 0), up −∂d/∂θ.
     pub fn placement(
@@ -63,12 +72,12 @@ impl ArmGeometry {
         distance_mm: f64,
         target: &TargetPlace,
     ) -> Placement {
-        let theta = reading.theta + self.theta_zero_deg.to_radians();
-        let (sp, cp) = (reading.phi + self.phi_zero_deg.to_radians()).sine_cosine();
+        let shaft = self.shaft(reading);
+        let (sp, cp) = shaft.phi.sine_cosine();
         let (right, radial) = ([-sp, cp, 0.0], [cp, sp, 0.0]);
         let (tilt_sine, tilt_cosine) = self.axis_square_deg.to_radians().sine_cosine();
         let axis = [tilt_cosine * right[0], tilt_cosine * right[1], tilt_sine];
-        let turned = Rotation::new(axis, theta);
+        let turned = Rotation::new(axis, shaft.theta);
         let arm = turned.of([
             self.right_mm * right[0],
             self.right_mm * right[1],

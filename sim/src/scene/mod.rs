@@ -228,7 +228,8 @@ impl<'a> Painter<'a> {
             light: LightField::new(geometry.light_distance_m, &light, scene.beam),
             camera_at_m: camera.at_mm.map(|c| c * 1e-3),
             silhouette: scene.occluder.and_then(|o| {
-                Silhouette::new(o, geometry.light_distance_m, light.direction(), &optics)
+                let shaft = geometry.light_arm.shaft(pose.light);
+                Silhouette::new(o, geometry.light_distance_m, shaft, &optics)
             }),
             optics,
         }
@@ -380,6 +381,26 @@ mod tests {
         scene.occluder = None;
         let open = scene.render(Surface::Reference, at, 0).rgb[100 * 200 + 100];
         assert!(hidden[1] < 0.03 * open[1] && hidden[1] > 0.0);
+    }
+
+    #[test]
+    fn the_lights_arm_stays_on_its_side_when_its_light_passes_the_pole() {
+        let mut scene = scene(200);
+        scene.noise = None;
+        let hidden = |theta_i: f64| -> Vec<bool> {
+            let mut at = pose(0.0, 70.0, 25.0, 0.0);
+            at.light.theta = theta_i.to_radians();
+            let shown = scene.render(Surface::Reference, at, 0).rgb;
+            let mut open = scene.clone();
+            open.occluder = None;
+            let open = open.render(Surface::Reference, at, 0).rgb;
+            let darker = |(a, b): (&[f32; 3], &[f32; 3])| a[1] < 0.5 * b[1];
+            shown.iter().zip(&open).map(darker).collect()
+        };
+        let (before, after) = (hidden(-0.01), hidden(0.01));
+        let count = after.iter().filter(|hidden| **hidden).count();
+        let differ = before.iter().zip(&after).filter(|(a, b)| a != b).count();
+        assert!(count > 100 && differ < count / 50, "{count} {differ}");
     }
 
     #[test]

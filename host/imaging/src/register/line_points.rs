@@ -50,7 +50,8 @@ impl Registrar {
             }
             Search::Far | Search::About => {
                 let (within_widths, trust) = loose(search, width);
-                let found = self.elsewhere(frame, view, &predicted, within_widths, &trust);
+                let found =
+                    self.elsewhere(frame, view, &predicted, within_widths, (&trust, &|all| all));
                 let Some(Elsewhere { strips, fit, .. }) = found else {
                     return Vec::new();
                 };

@@ -11,7 +11,7 @@ pub enum CalibrateError {
     Frames(ProcessError),
     /// Fewer frames than a calibration needs show the target.
     #[error(
-        "{frames} frames show the target, and a calibration needs {needed}: take some at other poses of the camera"
+        "a calibration needs {needed} frames that show the target, and there are {frames}: take some at other poses of the camera"
     )]
     TooFew {
         /// Frames there are.
@@ -39,7 +39,7 @@ pub enum CalibrateError {
     },
     /// Frames contradict each other.
     #[error(
-        "the lines of {misfits} of {frames} frames do not fit the camera that the others fit (frame {frame} by {misfit_px:.1} pixels): frames of two rigs, or a rig that was moved; calibrate each part by itself"
+        "the lines of {misfits} of {frames} frames do not fit one camera (frame {frame} by {misfit_px:.1} pixels): frames of two rigs, or a rig that was moved; calibrate each part by itself"
     )]
     TwoRigs {
         /// Frames that do not fit.

@@ -8,7 +8,7 @@ use crate::calibrate::shading::{
 };
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
-use crate::calibrate::{are_free, covariance_of, priors, states};
+use crate::calibrate::{are_free, covariance_of, priors, started, states};
 use gonia_rig::Rig;
 use nalgebra::DMatrix;
 
@@ -98,7 +98,14 @@ impl Light {
         };
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
         let everything = free(&[true; LIGHT.len()], prior.len());
-        let all = solve_light(&shading, &nominal, &prior, &everything)?;
+        let first = solve_light(&shading, &nominal, &prior, &everything, (Some(&OWN), None))?;
+        let all = solve_light(
+            &shading,
+            &nominal,
+            &prior,
+            &everything,
+            (None, Some(&first)),
+        )?;
         let within = all.noise * typical;
         if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
             return Ok(Self::left(unlike(&all, within)));
@@ -114,10 +121,16 @@ impl Light {
             &own,
         );
         let kept = free(&are_free(&states), prior.len());
-        let solved = solve_light(&shading, &nominal, &prior, &kept)?;
+        let solved = solve_light(
+            &shading,
+            &nominal,
+            &prior,
+            &kept,
+            (Some(&all.own), Some(&all)),
+        )?;
         // What the light was thought to be, with the intensity and the reference that fit it best.
         let held = free(&[false; LIGHT.len()], prior.len());
-        let before = solve_light(&shading, &nominal, &prior, &held)?;
+        let before = solve_light(&shading, &nominal, &prior, &held, (Some(&all.own), None))?;
         let misfit = |solved: &Solved| {
             let at = shading.at(&solved.shared);
             median(frames.iter().map(|frame| frame.misfit(&at)).collect())
@@ -189,21 +202,25 @@ fn free(light: &[bool], count: usize) -> Vec<bool> {
     free
 }
 
+/// `own` are the standard deviations of frames' own numbers, where they are known already; `start` is an
+/// earlier solution.
 fn solve_light(
     shading: &Shading<'_>,
     nominal: &[f64],
     prior: &[f64],
     free: &[bool],
+    (own, start): (Option<&[f64]>, Option<&Solved>),
 ) -> Result<Solved, CalibrateError> {
     let problem = Problem {
         nominal,
         prior,
         free,
-        own: &OWN,
+        own: own.unwrap_or(&OWN),
         least_own: &LEAST_OWN,
-        finds_noise: true,
+        finds_noise: own.is_none(),
     };
-    solve(shading, &problem, nominal).ok_or(CalibrateError::NoSolution)
+    let start = started(nominal, free, start);
+    solve(shading, &problem, &start).ok_or(CalibrateError::NoSolution)
 }
 
 /// The covariance of camera, target and light together. With N the information of shading and l, t the

@@ -53,10 +53,10 @@ const SECOND: usize = 48;
 const FEWEST: usize = 6;
 /// Views must differ by this much, degrees.
 const APART_DEG: f64 = 15.0;
-/// A frame whose lines are further from the found camera than this many times the median frame's, and than
-/// this share of the frame's width, is not of this rig.
-const MISFIT_TIMES: f64 = 6.0;
+/// A frame whose lines are further from the found camera than this share of the frame's width, and than so
+/// many pixels, is not of this rig.
 const MISFIT_WIDTHS: f64 = 1e-3;
+const LEAST_MISFIT_PX: f64 = 0.3;
 /// Frames of the first steps, whose camera is not known well yet: this share of the width.
 const FIRST_MISFIT_WIDTHS: f64 = 8e-3;
 /// More than this share of frames that do not fit are another rig's.
@@ -268,14 +268,14 @@ fn gather(
 /// The camera that fits lines that were found from far off; frames that it does not fit are left out.
 fn first_camera(rig: &Rig, frames: &mut Vec<LineFrame>) -> Result<Rig, CalibrateError> {
     let free = [true; CAMERA.len()];
-    let solved = solve_camera(rig, frames, &free, false)?;
+    let solved = solve_camera(rig, frames, &free, Own::Usual, None)?;
     let camera = with_values(&CAMERA, rig, &solved.shared);
     let before = frames.len();
     frames.retain(|frame| fits(&camera, frame, FIRST_MISFIT_WIDTHS));
     if frames.len() == before || frames.is_empty() {
         return Ok(camera);
     }
-    let solved = solve_camera(rig, frames, &free, false)?;
+    let solved = solve_camera(rig, frames, &free, Own::Usual, None)?;
     Ok(with_values(&CAMERA, rig, &solved.shared))
 }
 
@@ -287,11 +287,23 @@ fn priors(unknowns: &[Unknown], rig: &Rig) -> Vec<f64> {
     unknowns.iter().map(|u| (u.prior)(rig)).collect()
 }
 
+/// Standard deviations of frames' own numbers.
+#[derive(Clone, Copy)]
+enum Own<'a> {
+    /// Those of most rigs will do.
+    Usual,
+    /// They are to be found.
+    Unknown,
+    /// They were found.
+    Found(&'a [f64]),
+}
+
 fn solve_camera(
     rig: &Rig,
     frames: &[LineFrame],
     free: &[bool],
-    finds_noise: bool,
+    own: Own<'_>,
+    start: Option<&Solved>,
 ) -> Result<Solved, CalibrateError> {
     let mut nominal = values(&CAMERA, rig);
     nominal.extend([0.0; lines::BIAS.len()]);
@@ -301,11 +313,25 @@ fn solve_camera(
         nominal: &nominal,
         prior: &camera_priors(rig),
         free: &free,
-        own: &lines::OWN,
+        own: match own {
+            Own::Found(own) => own,
+            Own::Usual | Own::Unknown => &lines::OWN,
+        },
         least_own: &lines::LEAST_OWN,
-        finds_noise,
+        finds_noise: matches!(own, Own::Unknown),
     };
-    solve(&Lines { rig, frames }, &problem, &nominal).ok_or(CalibrateError::NoSolution)
+    let start = started(&nominal, &free, start);
+    solve(&Lines { rig, frames }, &problem, &start).ok_or(CalibrateError::NoSolution)
+}
+
+/// Where to start: free numbers where an earlier solution has them.
+fn started(nominal: &[f64], free: &[bool], from: Option<&Solved>) -> Vec<f64> {
+    let Some(from) = from else {
+        return nominal.to_vec();
+    };
+    (0..nominal.len())
+        .map(|k| if free[k] { from.shared[k] } else { nominal[k] })
+        .collect()
 }
 
 /// Of the camera's numbers and of what lines have in common.
@@ -379,17 +405,14 @@ fn check_views(looked_at: usize, lines: &[LineFrame]) -> Result<(), CalibrateErr
 }
 
 /// Leaves out frames that do not fit the camera that most fit.
-fn keep_fitting(rig: &Rig, lines: &mut Vec<LineFrame>) -> Result<(), CalibrateError> {
-    let solved = solve_camera(rig, lines, &[true; CAMERA.len()], true)?;
+fn keep_fitting(rig: &Rig, lines: &mut Vec<LineFrame>) -> Result<Solved, CalibrateError> {
+    let solved = solve_camera(rig, lines, &[true; CAMERA.len()], Own::Usual, None)?;
     let camera = with_values(&CAMERA, rig, &solved.shared);
     let misfits: Vec<f64> = lines
         .iter()
         .map(|frame| misfit_px(&camera, frame))
         .collect();
-    let mut sorted = misfits.clone();
-    sorted.sort_by(f64::total_cmp);
-    let floor = (MISFIT_WIDTHS * rig.camera.width_px as f64).max(0.3);
-    let limit = floor.max(MISFIT_TIMES * sorted[sorted.len() / 2]);
+    let limit = (MISFIT_WIDTHS * rig.camera.width_px as f64).max(LEAST_MISFIT_PX);
     let total = lines.len();
     let odd = misfits
         .iter()
@@ -409,42 +432,65 @@ fn keep_fitting(rig: &Rig, lines: &mut Vec<LineFrame>) -> Result<(), CalibrateEr
                 misfit_px,
             })
         }
-        _ => Ok(()),
+        _ => Ok(solved),
     }
 }
 
-fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, CalibrateError> {
-    let mut lines = seen.lines;
-    check_views(looked_at, &lines)?;
-    keep_fitting(rig, &mut lines)?;
-    check_views(looked_at, &lines)?;
-    let nominal = values(&CAMERA, rig);
-    let prior = priors(&CAMERA, rig);
-    let all = solve_camera(rig, &lines, &[true; CAMERA.len()], true)?;
+/// Camera, camera arm and target as found.
+struct CameraSolution {
+    /// Values of [`CAMERA`].
+    shared: Vec<f64>,
+    covariance: DMatrix<f64>,
+    states: Vec<NumberState>,
+    /// Standard deviations of frames' own numbers.
+    own: Vec<f64>,
+}
+
+/// Frames that do not fit are left out of `lines`.
+fn find_camera(
+    rig: &Rig,
+    looked_at: usize,
+    lines: &mut Vec<LineFrame>,
+) -> Result<CameraSolution, CalibrateError> {
+    check_views(looked_at, lines)?;
+    let first = keep_fitting(rig, lines)?;
+    check_views(looked_at, lines)?;
+    let every = [true; CAMERA.len()];
+    let all = solve_camera(rig, lines, &every, Own::Unknown, Some(&first))?;
     let covariance = covariance_of(&all.information, &camera_priors(rig))?;
     let covariance = covariance
         .view((0, 0), (CAMERA.len(), CAMERA.len()))
         .into_owned();
-    let camera_states = states(&CAMERA, &nominal, &prior, &all.shared, &covariance);
-    let camera = solve_camera(rig, &lines, &are_free(&camera_states), true)?;
+    let (nominal, prior) = (values(&CAMERA, rig), priors(&CAMERA, rig));
+    let states = states(&CAMERA, &nominal, &prior, &all.shared, &covariance);
+    let own = Own::Found(&all.own);
+    let kept = solve_camera(rig, lines, &are_free(&states), own, Some(&all))?;
+    Ok(CameraSolution {
+        shared: kept.shared[..CAMERA.len()].to_vec(),
+        covariance,
+        states,
+        own: kept.own,
+    })
+}
+
+fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, CalibrateError> {
+    let mut lines = seen.lines;
+    let camera = find_camera(rig, looked_at, &mut lines)?;
     let with_camera = with_values(&CAMERA, rig, &camera.shared);
-    let light = Light::find(&with_camera, seen.shaded, &covariance)?;
+    let light = Light::find(&with_camera, seen.shaded, &camera.covariance)?;
     let found = light.rig(&with_camera);
 
     let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
     let mut numbers = table(
         &CAMERA,
-        &nominal,
+        &values(&CAMERA, rig),
         &camera.shared,
-        &prior,
-        &covariance,
-        &camera_states,
+        &priors(&CAMERA, rig),
+        &camera.covariance,
+        &camera.states,
     );
-    let (mut unknowns, mut shared, mut covariance) = (
-        vec![&CAMERA[..]],
-        camera.shared[..CAMERA.len()].to_vec(),
-        covariance,
-    );
+    let mut unknowns = vec![&CAMERA[..]];
+    let (mut shared, mut covariance) = (camera.shared, camera.covariance);
     if let Some(light) = light.solution() {
         let prior = priors(&LIGHT, rig);
         let own = light
