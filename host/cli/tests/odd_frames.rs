@@ -515,7 +515,7 @@ fn cameras_and_turns(sound: &[Sample]) -> Vec<Case> {
         ]),
         turned("a mirrored frame", |[x, y]| [PX - 1 - x, y], false)
             .used(&["the frame is mirrored, left for right"]),
-        displaced.refused(&["the target is seen +3.0 pixels to the right and"]),
+        displaced.refused(&["show it about +3.0 pixels to the right and"]),
         broken.used(&["material frame 1: is left out", "cut short"]),
         paths.read_as(sound),
     ]
