@@ -20,10 +20,10 @@ pub struct SamplingGrid {
 pub struct PointValue {
     /// Median radiance per channel.
     pub rgb: [f32; 3],
-    /// Centre of the pixels that were used minus the grid point, mm: at low resolution a patch
-    /// holds few pixels, and not evenly about its middle.
+    /// Centre of the pixels that were used minus the grid point, mm; 0 where the value is interpolated
+    /// because the patch holds few pixels.
     pub offset_mm: [f32; 2],
-    /// Number of pixels used; 0 when the value is interpolated because the patch is too small.
+    /// Number of pixels in the patch; 0 when it is too small to speak of any.
     pub pixels: u32,
     /// Robust standard deviation of the pixels about their median, per channel.
     pub spread: [f32; 3],
@@ -44,10 +44,14 @@ pub enum LeftOut {
     Border,
 }
 
-/// Patches of fewer pixels than this are interpolated at points spread over them.
+/// Patches of fewer pixels than this are interpolated at points spread over them: the pixels whose centres
+/// lie in a patch do not lie evenly about its middle, at 60 of them by up to a millimetre, which is .05° of the
+/// light.
+const FEW_PIXELS: usize = 400;
+/// Of such a patch's value no more is said than that it is interpolated where it holds fewer than this.
 const FEWEST_PIXELS: usize = 4;
-/// The interpolated points of such a patch, along each side.
-const POINTS_A_SIDE: usize = 4;
+/// The least number of points along each side of a patch that is interpolated.
+const LEAST_POINTS_A_SIDE: usize = 4;
 
 impl SamplingGrid {
     /// The grid of a rig: the paper's has 1225 points.
@@ -142,22 +146,24 @@ impl Sampler<'_> {
             return Err(reason_of(self.patch.values()));
         }
         let pixels = self.patch.len();
-        if pixels < FEWEST_PIXELS {
-            return self.interpolated(at);
+        if pixels < FEW_PIXELS {
+            return self.interpolated(at, pixels);
         }
         let mean = sum.map(|s| s / pixels as f64);
         let seen = self.offset(at, mean);
         Ok(self.value(seen, pixels as u32))
     }
 
-    /// Median over points spread evenly over a patch of hardly any pixels, each bilinear between
-    /// its four pixels: centred on the grid point, so that no offset is left.
-    fn interpolated(&mut self, at: [f64; 2]) -> Result<PointValue, LeftOut> {
+    /// Median over points spread evenly over a patch of few pixels, each bilinear between its four pixels:
+    /// centred on the grid point, so that no offset is left.
+    fn interpolated(&mut self, at: [f64; 2], pixels: usize) -> Result<PointValue, LeftOut> {
         self.patch.clear();
-        let place = |i: usize| self.patch_half * ((2 * i + 1) as f64 / POINTS_A_SIDE as f64 - 1.0);
+        // About one more than there are pixels along a side.
+        let side = LEAST_POINTS_A_SIDE.max(pixels.isqrt() + 2);
+        let place = |i: usize| self.patch_half * ((2 * i + 1) as f64 / side as f64 - 1.0);
         let size = [self.frame.width, self.frame.height];
-        for k in 0..POINTS_A_SIDE * POINTS_A_SIDE {
-            let d = [place(k % POINTS_A_SIDE), place(k / POINTS_A_SIDE)];
+        for k in 0..side * side {
+            let d = [place(k % side), place(k / side)];
             let p = self
                 .registration
                 .project([at[0] + d[0], at[1] + d[1]])
@@ -186,7 +192,8 @@ impl Sampler<'_> {
             }
             self.patch.extend(&[value]);
         }
-        Ok(self.value([0.0; 2], 0))
+        let pixels = if pixels < FEWEST_PIXELS { 0 } else { pixels };
+        Ok(self.value([0.0; 2], pixels as u32))
     }
 
     /// Where on the target a pixel position near a grid point is, relative to that point, mm.
