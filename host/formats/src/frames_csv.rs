@@ -32,12 +32,13 @@ const SAME_POSE_DEG: f64 = 0.03;
 /// moved, an exposure time that is not positive, or a path that leaves the folder.
 pub fn read_frames_csv(path: &Path) -> Result<FrameList, FileError> {
     let table = NamedTable::open(path, &["frame", "role", "file"], 5)?;
+    // First: where angles are missing, that is no table of poses at all.
+    let angles = table.angles()?;
     let [frame, role, file] = [
         table.column("frame")?,
         table.column("role")?,
         table.column("file")?,
     ];
-    let angles = table.angles()?;
     let exposure = table.optional_column("exposure_s")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut list = FrameList::default();
