@@ -43,7 +43,7 @@ pub enum LightState {
         needed: usize,
     },
     /// It stays as it was: the reference does not scatter as the rig says, or without a reflectance as a
-    /// Lambertian surface does.
+    /// smooth, reciprocal surface does.
     ReferenceUnlike {
         /// Standard deviation of a frame's level, relative.
         level: f64,
