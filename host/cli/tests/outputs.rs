@@ -495,6 +495,49 @@ fn promise_gigabytes(dense: &Path, path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
+fn exports(bench: &mut Bench) {
+    for (came_in, output, more, code, word) in [
+        (
+            "`export -o a.bsdf` of a relative BRDF",
+            "@a.bsdf",
+            &[][..],
+            1,
+            "give the factor that makes it so",
+        ),
+        (
+            "the same with `--assume-scale 0`",
+            "@a.bsdf",
+            &["--assume-scale", "0"],
+            1,
+            "give a factor above 0",
+        ),
+        (
+            "the same with `--assume-scale 2`",
+            "@a.bsdf",
+            &["--assume-scale", "2"],
+            0,
+            "is the table's last",
+        ),
+        (
+            "`export -o a.zmx`",
+            "@a.zmx",
+            &[],
+            1,
+            "give --format rgl (RGL .bsdf, .bsdf)",
+        ),
+        (
+            "`export --resolution 4`",
+            "@a.bsdf",
+            &["--resolution", "4"],
+            1,
+            "give 8 to 128",
+        ),
+    ] {
+        let arguments = [&["export", "@a.exr", "-o", output], more].concat();
+        bench.case(came_in, &arguments, "", code, &[word]);
+    }
+}
+
 // long: a list of cases, one after the other
 fn outputs(bench: &mut Bench) {
     fs::create_dir(bench.at("there")).unwrap();
@@ -587,6 +630,7 @@ fn outputs(bench: &mut Bench) {
         1,
         &["name it .npy or .csv"],
     );
+    exports(bench);
     promise_gigabytes(&bench.at("a.exr"), &bench.at("huge.exr"));
     let came_in = "a small EXR whose header promises 11.8 GB";
     let said = ["promises 31320 × 31320 pixels"];
