@@ -45,7 +45,7 @@ impl Export {
         let progress = Progress::new();
         let dense = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
         let grid = dense.brdf.grid();
-        let last_deg = grid.direction(grid.n_directions() - 1).theta_deg();
+        let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
         let error = progress.stage("writing and reading back", |_| {
             export(
                 dense,

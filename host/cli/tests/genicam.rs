@@ -227,9 +227,11 @@ fn a_session_through_gige_vision_has_the_samples_of_the_simulated_camera_whateve
     println!("samples, bias, RMS of the logarithm: {expected:?} {calm:?} {troubled:?}");
     for (n, bias, rms) in [calm, troubled] {
         assert_eq!(n, expected.0);
-        // Noise of a hundredth in ten thousand values; the sensor's is a little more than the scene's.
+        // Noise of a hundredth in ten thousand values; the sensor's is a little more than the scene's. A
+        // mosaic measures a channel at a quarter to a half of the pixels: neighbours share their noise, and
+        // a patch averages up to 1.8 times less of it. Measured: 1.30.
         assert!((bias - expected.1).abs() < 5e-4, "{bias}");
-        assert!(rms < 1.25 * expected.2, "{rms}");
+        assert!(rms < 1.4 * expected.2, "{rms}");
     }
 }
 
