@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(foreign_format(&by_bytes).ok().unwrap().name, "MERL .binary");
         for name in ["a.txt", "a.exr"] {
             let error = foreign_format(&at(name)).err().unwrap().to_string();
-            let said = "neither .bin (UTIA), .binary (MERL) nor .dat (Ngan, Durand, Matusik); give other samples to gonia fill as CSV";
+            let said = "neither .bin (UTIA), .binary (MERL), .dat (Ngan, Durand, Matusik) nor .bsdf (RGL, Mitsuba's measured); give other samples to gonia fill as CSV";
             assert!(error.ends_with(said), "{error}");
         }
     }

@@ -199,9 +199,10 @@ fn somewhat_off(seed: u64) -> Rig {
 
 #[test]
 fn a_calibrated_rig_is_calibrated_again_to_the_same() {
-    let truth = somewhat_off(5);
+    // Of smaller frames the prior has its say in what is found, and it lies elsewhere the second time.
+    let truth = crooked(240, 0.3, 5);
     let source = Rendered::new(&truth, random_rows(Role::Reference, 30, 2), 0.0);
-    let once = run(&source, 160).unwrap();
+    let once = run(&source, 240).unwrap();
     let twice = calibrate(&once.rig, &source, &silent).unwrap();
     for (spread, u) in twice.changes.iter().zip(&once.direction_u) {
         assert!(spread.p95 < 2.0 * u.p95, "{spread:?} {u:?}");

