@@ -417,7 +417,7 @@ mod tests {
             assert_eq!(error.lines().count(), 1);
         }
         let error = read_text("frame,role\n").unwrap_err().to_string();
-        assert!(error.contains("no column \"file\""), "{error}");
+        assert!(error.contains("no column \"theta_i_deg\""), "{error}");
     }
 
     #[test]
