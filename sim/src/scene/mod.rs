@@ -388,7 +388,7 @@ mod tests {
         let mut scene = scene(200);
         scene.noise = None;
         let hidden = |theta_i: f64| -> Vec<bool> {
-            let mut at = pose(0.0, 70.0, 25.0, 0.0);
+            let mut at = pose(0.0, 0.0, 25.0, 0.0);
             at.light.theta = theta_i.to_radians();
             let shown = scene.render(Surface::Reference, at, 0).rgb;
             let mut open = scene.clone();
