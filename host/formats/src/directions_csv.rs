@@ -1,4 +1,4 @@
-//! Pairs of directions as a table, for what is asked of a dense BRDF.
+//! Pairs of directions as a table, at which a BRDF is evaluated.
 
 use crate::FileError;
 use crate::named_table::NamedTable;

@@ -1,4 +1,4 @@
-//! Few samples, at scattered places: kriging in double precision at the very directions that are asked for.
+//! Few samples, at scattered places: kriging in double precision, evaluated at any directions.
 //!
 //! Where the blocks of [`interpolate`](crate::interpolate) share one system among thousands of cells, here each
 //! place has a system through the data nearest to it, so that effort goes where the data are. The symmetry of the
@@ -162,7 +162,7 @@ impl Response {
     }
 }
 
-/// A BRDF fitted to few samples, to be asked anywhere.
+/// A BRDF fitted to few samples, to be evaluated anywhere.
 pub struct ScatteredFit {
     data: Vec<Datum>,
     places: Places,
@@ -183,7 +183,7 @@ pub fn is_few(samples: &[Sample]) -> bool {
 }
 
 impl ScatteredFit {
-    /// Fits samples, with a symmetry that is asked for or, without, with what they show. `None` of too few.
+    /// Fits samples, with a given symmetry or, without one, with what they show. `None` of too few.
     pub fn new(samples: &[Sample], symmetry: Option<Symmetry>) -> Option<Self> {
         let data = data::merged(samples);
         if data.len() < PLACES_MIN {
