@@ -20,7 +20,7 @@ pub(super) struct Places {
     tree: Option<ImmutableKdTree<f32, 6>>,
 }
 
-/// In the search, turned places are as near as they are up to a factor of two: so many more are looked at.
+/// The search takes turned places for up to twice as near as they are: it returns this many times the places wanted.
 const MORE: usize = 3;
 /// Images of one datum within this of each other are one.
 const SAME2: f64 = 1e-12;
