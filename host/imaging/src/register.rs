@@ -5,6 +5,7 @@
 //! little, is the prior: what a grazing or half-hidden line leaves open is filled in from it, and
 //! the move is the estimate of the arms' error.
 
+mod elsewhere;
 mod line_points;
 mod prior;
 
@@ -39,16 +40,12 @@ const MAX_SURPRISE: f64 = 25.0;
 const MAX_DEVIATION: f64 = 6.0;
 /// Standard deviation of an arm that does not hold its 0.03°.
 const LOOSE_ARM_DEG: f64 = 0.5;
-/// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
-const LOOSE_ROLL_DEG: f64 = 1.0;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
 const HOUGH_RESOLUTION: f64 = 0.5;
 /// Half the width of the neighbourhood searched: this share of the frame's width and 4 pixels.
 const SEARCH_WIDTHS: f64 = 0.02;
-/// Half the width of the neighbourhood in which a displaced target is looked for.
-const FAR_WIDTHS: f64 = 0.15;
 /// Half the width of the neighbourhood in which a trusted camera sees the lines, likewise.
 const NEAR_WIDTHS: f64 = 1e-3;
 /// A line further than this from its prediction is measured again from a better one.
@@ -277,46 +274,6 @@ impl Registrar {
         Ok((solution, predicted.clone()))
     }
 
-    /// A failure, or what is behind it where the whole target is elsewhere.
-    fn explain(
-        &self,
-        frame: &Frame,
-        view: Direction,
-        predicted: &Homography,
-        failure: RegistrationFailure,
-    ) -> RegistrationFailure {
-        if let Some(turn) = self.turned(frame, view, predicted) {
-            return RegistrationFailure::Turned(turn);
-        }
-        if let RegistrationFailure::FarFromPose { .. } = failure {
-            return failure;
-        }
-        // A target that is moved along two of its lines shows those two in their places.
-        let found = [SEARCH_WIDTHS, FAR_WIDTHS]
-            .into_iter()
-            .find_map(|within| self.displacement(frame, view, predicted, within));
-        match found {
-            Some(by) => {
-                // What moves the fiducial lines most.
-                let radius_px = predicted_radius_px(predicted, &self.target);
-                let by_roll = by.roll.abs() * radius_px;
-                let by_size = by.log_scale.abs() * radius_px;
-                let by_shift = by.shift_px[0].hypotenuse(by.shift_px[1]);
-                if by_roll > by_shift.max(by_size) {
-                    let roll_deg = by.roll.to_degrees();
-                    RegistrationFailure::Rolled { roll_deg }
-                } else if by_size > by_shift {
-                    let share = by.log_scale.exponential() - 1.0;
-                    RegistrationFailure::Resized { share }
-                } else {
-                    let shift_px = by.shift_px;
-                    RegistrationFailure::Displaced { shift_px }
-                }
-            }
-            None => failure,
-        }
-    }
-
     /// The strongest lines within `search_px` of their predictions.
     fn hough(
         &self,
@@ -328,25 +285,6 @@ impl Registrar {
         strips
             .each_ref()
             .map(|strip| strongest_line(frame, strip, half_width, search_px, self.hough_resolution))
-    }
-
-    /// How a frame in which the lines are not where they should be was turned, when they are once it is
-    /// turned back. A square target straight from above is the same either way.
-    fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
-        let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
-        Turn::ALL.into_iter().find(|turn| {
-            let Some(as_taken) = turn.undo(frame) else {
-                return false;
-            };
-            let strips = self.strips(&as_taken, predicted, near_px);
-            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
-            // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
-            lines.iter().all(Option::is_some)
-                && self
-                    .estimate(view, &strips, &lines, &self.trust(ARM_DEG))
-                    .surprise
-                    <= MAX_SURPRISE
-        })
     }
 
     fn solve(
@@ -490,70 +428,6 @@ impl Registrar {
         let mut trust = self.trust(LOOSE_ARM_DEG);
         trust.model_px = trust.model_px.max(arm_off.misfit_px);
         self.estimate(view, strips, lines, &trust)
-    }
-
-    /// How the whole target is moved and turned from its place, where it is within so many frame widths: a
-    /// camera whose image is moved (and turned a little) must see all four lines.
-    fn displacement(
-        &self,
-        frame: &Frame,
-        view: Direction,
-        predicted: &Homography,
-        within_widths: f64,
-    ) -> Option<CameraShift> {
-        let trust = Trust {
-            shift_widths: within_widths,
-            roll_deg: LOOSE_ROLL_DEG,
-            ..self.trust(ARM_DEG)
-        };
-        let moved = |guess: CameraShift| CameraShift {
-            shift_px: guess.shift_px,
-            roll: guess.roll,
-            ..CameraShift::default()
-        };
-        let found = self.elsewhere(frame, view, predicted, within_widths, (&trust, &moved))?;
-        Some(found.estimate.shift)
-    }
-
-    /// The four lines within so many frame widths of their predictions, where a camera within `trust` sees
-    /// them. `taken` says what of a first guess is taken for where they are looked at closely.
-    fn elsewhere(
-        &self,
-        frame: &Frame,
-        view: Direction,
-        predicted: &Homography,
-        within_widths: f64,
-        (trust, taken): (&Trust, &dyn Fn(CameraShift) -> CameraShift),
-    ) -> Option<Elsewhere> {
-        let width = frame.width as f64;
-        let search_px = within_widths * width + 4.0;
-        let strips = self.strips(frame, predicted, search_px);
-        let hough = self.hough(frame, &strips, search_px);
-        let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
-        // One of them may be something else's.
-        let choices = (0..=4).map(|out| {
-            let mut some = lines;
-            if let Some(line) = some.get_mut(out) {
-                *line = None;
-            }
-            some
-        });
-        choices.rev().find_map(|some| {
-            if some.iter().flatten().count() < MIN_LINES {
-                return None;
-            }
-            let guess = taken(self.estimate(view, &strips, &some, trust).shift);
-            let there = self.camera.predict(view, guess);
-            let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
-            let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
-            let estimate = self.estimate(view, &strips, &fit.lines, trust);
-            let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
-            fits.then_some(Elsewhere {
-                strips,
-                fit,
-                estimate,
-            })
-        })
     }
 
     fn trust(&self, arm_deg: f64) -> Trust {
@@ -707,13 +581,6 @@ impl Registrar {
     }
 }
 
-/// Four lines that are not where they were predicted.
-struct Elsewhere {
-    strips: [LineStrip; 4],
-    fit: LineFit,
-    estimate: Estimate,
-}
-
 struct Solution {
     homography: Homography,
     shift: CameraShift,
@@ -813,12 +680,6 @@ fn crossing(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> Option<[f64; 2]> {
     let g = [b[0][0] - a[0][0], b[0][1] - a[0][1]];
     let t = (g[0] * e[1] - g[1] * e[0]) / det;
     Some([a[0][0] + t * d[0], a[0][1] + t * d[1]])
-}
-
-/// Half the distance on the frame between two opposite fiducial lines.
-fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
-    let [a, b] = [-1.0, 1.0].map(|side| predicted.apply([side * target.line_offset_mm, 0.0]));
-    0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
 }
 
 #[cfg(test)]

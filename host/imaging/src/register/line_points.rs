@@ -1,7 +1,8 @@
 //! Pieces of the fiducial lines, for a calibration of the rig: found near where the rig has them, or from
 //! far off.
 
-use super::{Elsewhere, MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
+use super::elsewhere::Elsewhere;
+use super::{MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
 use crate::lines::SIDES;
 use crate::refine::{Starts, fit_lines, pieces};
 use gonia_brdf::{Direction, Elementary};

@@ -1,0 +1,155 @@
+//! A target that is not where its pose puts it: where else it is, and what that says of the frame or the rig.
+
+use super::prior::ARM_DEG;
+use super::{
+    Estimate, MAX_SURPRISE, MIN_LINES, NEAR_WIDTHS, Registrar, RegistrationFailure, SEARCH_WIDTHS,
+    Trust,
+};
+use crate::lines::LineStrip;
+use crate::refine::{LineFit, Starts, fit_lines};
+use crate::turn::Turn;
+use gonia_brdf::{Direction, Elementary};
+use gonia_rig::{CameraShift, Frame, Homography, Target};
+
+/// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
+const LOOSE_ROLL_DEG: f64 = 1.0;
+/// Half the width of the neighbourhood in which a displaced target is looked for.
+const FAR_WIDTHS: f64 = 0.15;
+
+/// Four lines that are not where they were predicted.
+pub(super) struct Elsewhere {
+    pub strips: [LineStrip; 4],
+    pub fit: LineFit,
+    pub estimate: Estimate,
+}
+
+impl Registrar {
+    /// A failure, or what is behind it where the whole target is elsewhere.
+    pub(super) fn explain(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        failure: RegistrationFailure,
+    ) -> RegistrationFailure {
+        if let Some(turn) = self.turned(frame, view, predicted) {
+            return RegistrationFailure::Turned(turn);
+        }
+        if let RegistrationFailure::FarFromPose { .. } = failure {
+            return failure;
+        }
+        // A target that is moved along two of its lines shows those two in their places.
+        let found = [SEARCH_WIDTHS, FAR_WIDTHS]
+            .into_iter()
+            .find_map(|within| self.displacement(frame, view, predicted, within));
+        match found {
+            Some(by) => {
+                // What moves the fiducial lines most.
+                let radius_px = predicted_radius_px(predicted, &self.target);
+                let by_roll = by.roll.abs() * radius_px;
+                let by_size = by.log_scale.abs() * radius_px;
+                let by_shift = by.shift_px[0].hypotenuse(by.shift_px[1]);
+                if by_roll > by_shift.max(by_size) {
+                    let roll_deg = by.roll.to_degrees();
+                    RegistrationFailure::Rolled { roll_deg }
+                } else if by_size > by_shift {
+                    let share = by.log_scale.exponential() - 1.0;
+                    RegistrationFailure::Resized { share }
+                } else {
+                    let shift_px = by.shift_px;
+                    RegistrationFailure::Displaced { shift_px }
+                }
+            }
+            None => failure,
+        }
+    }
+
+    /// How a frame in which the lines are not where they should be was turned, when they are once it is
+    /// turned back. A square target straight from above is the same either way.
+    fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
+        let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
+        Turn::ALL.into_iter().find(|turn| {
+            let Some(as_taken) = turn.undo(frame) else {
+                return false;
+            };
+            let strips = self.strips(&as_taken, predicted, near_px);
+            let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
+            // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
+            lines.iter().all(Option::is_some)
+                && self
+                    .estimate(view, &strips, &lines, &self.trust(ARM_DEG))
+                    .surprise
+                    <= MAX_SURPRISE
+        })
+    }
+
+    /// How the whole target is moved and turned from its place, where it is within so many frame widths: a
+    /// camera whose image is moved (and turned a little) must see all four lines.
+    fn displacement(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+    ) -> Option<CameraShift> {
+        let trust = Trust {
+            shift_widths: within_widths,
+            roll_deg: LOOSE_ROLL_DEG,
+            ..self.trust(ARM_DEG)
+        };
+        let moved = |guess: CameraShift| CameraShift {
+            shift_px: guess.shift_px,
+            roll: guess.roll,
+            ..CameraShift::default()
+        };
+        let found = self.elsewhere(frame, view, predicted, within_widths, (&trust, &moved))?;
+        Some(found.estimate.shift)
+    }
+
+    /// The four lines within so many frame widths of their predictions, where a camera within `trust` sees
+    /// them. `taken` says what of a first guess is taken for where they are looked at closely.
+    pub(super) fn elsewhere(
+        &self,
+        frame: &Frame,
+        view: Direction,
+        predicted: &Homography,
+        within_widths: f64,
+        (trust, taken): (&Trust, &dyn Fn(CameraShift) -> CameraShift),
+    ) -> Option<Elsewhere> {
+        let width = frame.width as f64;
+        let search_px = within_widths * width + 4.0;
+        let strips = self.strips(frame, predicted, search_px);
+        let hough = self.hough(frame, &strips, search_px);
+        let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
+        // One of them may be something else's.
+        let choices = (0..=4).map(|out| {
+            let mut some = lines;
+            if let Some(line) = some.get_mut(out) {
+                *line = None;
+            }
+            some
+        });
+        choices.rev().find_map(|some| {
+            if some.iter().flatten().count() < MIN_LINES {
+                return None;
+            }
+            let guess = taken(self.estimate(view, &strips, &some, trust).shift);
+            let there = self.camera.predict(view, guess);
+            let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
+            let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
+            let estimate = self.estimate(view, &strips, &fit.lines, trust);
+            let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
+            fits.then_some(Elsewhere {
+                strips,
+                fit,
+                estimate,
+            })
+        })
+    }
+}
+
+/// Half the distance on the frame between two opposite fiducial lines.
+fn predicted_radius_px(predicted: &Homography, target: &Target) -> f64 {
+    let [a, b] = [-1.0, 1.0].map(|side| predicted.apply([side * target.line_offset_mm, 0.0]));
+    0.5 * (a[0] - b[0]).hypotenuse(a[1] - b[1])
+}
