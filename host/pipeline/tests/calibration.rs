@@ -6,7 +6,7 @@ use gonia_brdf::model::{Kurt, Lambert};
 use gonia_brdf::random::Random;
 use gonia_brdf::{Direction, Pose, Vec3};
 use gonia_formats::FileError;
-use gonia_pipeline::calibrate::{LightState, number_of};
+use gonia_pipeline::calibrate::LightState;
 use gonia_pipeline::process::FrameSource;
 use gonia_pipeline::{CalibrateError, Calibrated, calibrate, silent};
 use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Reference, Rig, Role};
@@ -302,7 +302,7 @@ fn fifty_rigs_lie_within_their_uncertainties() {
             within += usize::from(errors[i][0] < 2.0 * found.direction_u[i].p50);
         }
         for n in &found.numbers {
-            let z = (n.found - number_of(&truth, n.name).unwrap()) / n.u;
+            let z = (n.found - *truth.clone().number_mut(n.name).unwrap()) / n.u;
             by_name.entry(n.name).or_default().push(z);
         }
         eprintln!(

@@ -23,7 +23,6 @@ mod unknowns;
 pub use error::CalibrateError;
 pub use light::LightState;
 pub use numbers::{Number, NumberState, Spread};
-pub use unknowns::number_of;
 
 use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
 use crate::progress::{Cancelled, Progress, Step, step};

@@ -90,12 +90,6 @@ pub const LIGHT: [Unknown; 11] = [
     unknown("light.beam[4]", WhenNeeded, |_| 3.0, |r| &mut r.light.beam[4]),
 ];
 
-/// A number of a rig by its key in `rig.toml`, where a calibration knows it: `camera.centre_px[0]`.
-pub fn number_of(rig: &Rig, name: &str) -> Option<f64> {
-    let unknown = CAMERA.iter().chain(&LIGHT).find(|u| u.name == name)?;
-    Some(*(unknown.of)(&mut rig.clone()))
-}
-
 /// The numbers of a rig.
 pub fn values(unknowns: &[Unknown], rig: &Rig) -> Vec<f64> {
     let mut rig = rig.clone();
@@ -112,4 +106,18 @@ pub fn with_values(unknowns: &[Unknown], rig: &Rig, values: &[f64]) -> Rig {
     }
     rig.camera.focal_y_px = aspect.map(|aspect| aspect * rig.camera.focal_px);
     rig
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_the_key_of_its_number() {
+        for unknown in CAMERA.iter().chain(&LIGHT) {
+            let mut rig = Rig::paper(400);
+            *rig.number_mut(unknown.name).unwrap() = 0.125;
+            assert_eq!(*(unknown.of)(&mut rig), 0.125, "{}", unknown.name);
+        }
+    }
 }
