@@ -67,7 +67,7 @@ pub enum Error {
     },
     /// A format means 1/sr, and the values are relative.
     #[error(
-        "the BRDF is relative, and a {format} means 1/sr: give the factor that makes it so (--assume-scale 1 takes the values as they are)"
+        "the BRDF is relative, and the format {format} means 1/sr: give the factor that makes it so (--assume-scale 1 takes the values as they are)"
     )]
     RelativeExport {
         /// The format's name.
