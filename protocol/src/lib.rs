@@ -27,6 +27,9 @@ pub const PROTOCOL_VERSION: u8 = 1;
 /// layout. A test recomputes it, so a change of layout cannot pass unseen.
 pub const SCHEMA_KEY: u32 = 0x8aab_438c;
 
+/// Bits per second of the serial line, on every board and on the host.
+pub const BAUD: u32 = 921_600;
+
 /// Longest packet on the wire, the closing zero byte included.
 pub const MAX_PACKET: usize = 256;
 

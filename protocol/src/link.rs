@@ -28,6 +28,15 @@ impl Default for RetryPolicy {
     }
 }
 
+/// How many times longer than usual a request may take: erasing flash stalls a controller for up to half a
+/// second, and more where its sectors are large.
+fn patience(message: &Message) -> u32 {
+    match message {
+        Message::SaveSettings => 4,
+        _ => 1,
+    }
+}
+
 /// The host's end.
 #[derive(Debug)]
 pub struct Requester {
@@ -106,7 +115,7 @@ impl Requester {
             id: self.last_id,
             packet,
             due_us: now_us + self.retry.retry_us,
-            tries_left: self.retry.tries.saturating_sub(1),
+            tries_left: (self.retry.tries * patience(message)).saturating_sub(1),
         });
         Ok((pending.id, &pending.packet))
     }
@@ -243,6 +252,14 @@ mod tests {
         assert_eq!(link.poll(300), NextAction::GiveUp);
         assert_eq!(link.poll(301), NextAction::Nothing);
         assert_eq!(link.repeats(), 2);
+    }
+
+    #[test]
+    fn a_save_is_waited_for_longer() {
+        let mut link = Requester::new(1, 0, RETRY);
+        link.begin(&Message::SaveSettings, 0).unwrap();
+        let sends = (1..100).take_while(|i| link.poll(i * 100) != NextAction::GiveUp);
+        assert_eq!(sends.count(), 4 * RETRY.tries as usize - 1);
     }
 
     #[test]

@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 30;
+pub const N_SETTINGS: usize = 32;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ impl Axis {
 pub enum Key {
     /// Motor steps a turn of the shaft.
     StepsPerTurn = 0,
-    /// Encoder counts a turn of the shaft.
+    /// Encoder counts a turn of the shaft: a power of two.
     EncoderCountsPerTurn = 1,
     /// Encoder count at 0°.
     EncoderZero = 2,
@@ -103,6 +103,10 @@ pub enum Key {
     GearCos = 28,
     /// Sine of the same, µdeg.
     GearSin = 29,
+    /// 1 where the motor, wired as it is, turns the axis down when the direction output is high.
+    MotorReversed = 30,
+    /// 1 where the encoder counts up when the axis turns down.
+    EncoderReversed = 31,
 }
 
 /// What a key means.
@@ -137,14 +141,14 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
         Key::EncoderCountsPerTurn,
         "encoder_counts_per_turn",
         "counts",
-        (1024, 1 << 24),
+        (1024, 1 << 26),
         [1 << 18; 2],
     ),
     m(
         Key::EncoderZero,
         "encoder_zero",
         "counts",
-        (0, 1 << 24),
+        (0, 1 << 26),
         [0; 2],
     ),
     m(
@@ -294,6 +298,8 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     ),
     map(Key::GearCos, "gear_cos"),
     map(Key::GearSin, "gear_sin"),
+    m(Key::MotorReversed, "motor_reversed", "", (0, 1), [0; 2]),
+    m(Key::EncoderReversed, "encoder_reversed", "", (0, 1), [0; 2]),
 ];
 
 /// An amplitude of an error.

@@ -268,6 +268,8 @@ fn no_setting_has_ever_changed_its_number_or_its_unit() {
         "27 worm_turn µdeg",
         "28 gear_cos µdeg",
         "29 gear_sin µdeg",
+        "30 motor_reversed",
+        "31 encoder_reversed",
     ];
     assert_eq!(listed, frozen);
 }

@@ -15,6 +15,8 @@ pub struct SimulatedArm {
     steps: [StepChannel<VirtualTimer>; 2],
     now_us: u64,
     trigger: bool,
+    /// When the pulse under way ends by itself.
+    pulse_ends_us: u64,
     rising_edges: u32,
     /// A pulse has ended.
     has_fallen: bool,
@@ -105,6 +107,7 @@ impl SimulatedArm {
             steps: [0; 2].map(|_| VirtualTimer::at_rest(0)),
             now_us: 0,
             trigger: false,
+            pulse_ends_us: 0,
             rising_edges: 0,
             has_fallen: false,
             holds_interlock_open: false,
@@ -137,6 +140,9 @@ impl SimulatedArm {
     /// Lets the time pass up to now: the steps that were due by then are given.
     pub fn set_now(&mut self, now_us: u64) {
         self.now_us = now_us;
+        if self.trigger && now_us >= self.pulse_ends_us {
+            self.end_pulse();
+        }
         for (steps, plant) in self.steps.iter_mut().zip(&mut self.axes) {
             play(steps, plant, now_us);
         }
@@ -213,7 +219,7 @@ impl Hardware for SimulatedArm {
         self.steps[axis.index()].halt();
     }
 
-    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, axis: Axis, _: u32) -> Result<u32, EncoderLost> {
         let now_us = self.now_us;
         self.axes[axis.index()]
             .encoder_counts(now_us)
@@ -233,12 +239,18 @@ impl Hardware for SimulatedArm {
         self.holds_interlock_open = open;
     }
 
-    fn set_trigger(&mut self, on: bool) {
-        if on && !self.trigger {
+    fn begin_pulse(&mut self, now_us: u64, length_us: u32) -> u64 {
+        if !self.trigger {
             self.rising_edges += 1;
         }
-        self.has_fallen |= self.trigger && !on;
-        self.trigger = on;
+        self.trigger = true;
+        self.pulse_ends_us = now_us + u64::from(length_us);
+        now_us
+    }
+
+    fn end_pulse(&mut self) {
+        self.has_fallen |= self.trigger;
+        self.trigger = false;
     }
 
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
@@ -247,7 +259,11 @@ impl Hardware for SimulatedArm {
 }
 
 impl Sectors for RamFlash {
-    fn read(&mut self, sector: usize, out: &mut [u8]) -> Result<(), NotSaved> {
+    fn slots(&self) -> usize {
+        1
+    }
+
+    fn read(&mut self, sector: usize, _: usize, out: &mut [u8]) -> Result<(), NotSaved> {
         let from = self.sectors.get(sector).ok_or(NotSaved)?;
         out.copy_from_slice(from.get(..out.len()).ok_or(NotSaved)?);
         Ok(())
@@ -258,7 +274,7 @@ impl Sectors for RamFlash {
         Ok(())
     }
 
-    fn write(&mut self, sector: usize, bytes: &[u8]) -> Result<(), NotSaved> {
+    fn write(&mut self, sector: usize, _: usize, bytes: &[u8]) -> Result<(), NotSaved> {
         let dies_after = self.dies_after.take();
         let written = dies_after.map_or(bytes, |n| &bytes[..n.min(bytes.len())]);
         let to = self.sectors.get_mut(sector).ok_or(NotSaved)?;

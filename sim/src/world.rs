@@ -166,7 +166,7 @@ impl World {
         }
         while arm.late_edges_us.front().is_some_and(|&at| at <= now_us) {
             arm.late_edges_us.pop_front();
-            arm.node.trigger_edge(now_us, &mut arm.hardware);
+            arm.node.trigger_edge(now_us, now_us, &mut arm.hardware);
         }
         let edges = arm.hardware.take_rising_edges();
         if arm.hardware.take_fall() {
@@ -231,7 +231,9 @@ impl World {
             follower.late_edges_us.push_back(now_us + late_us);
             return;
         }
-        follower.node.trigger_edge(now_us, &mut follower.hardware);
+        follower
+            .node
+            .trigger_edge(now_us, now_us, &mut follower.hardware);
         self.send_packets(1 - source);
     }
 

@@ -42,7 +42,7 @@ impl Hardware for Board {
         StepProgress::default()
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
         Ok(1000)
     }
     fn home_switch_closed(&mut self, _: Axis) -> bool {
@@ -52,7 +52,10 @@ impl Hardware for Board {
         true
     }
     fn hold_interlock_open(&mut self, _: bool) {}
-    fn set_trigger(&mut self, _: bool) {}
+    fn begin_pulse(&mut self, now_us: u64, _: u32) -> u64 {
+        now_us
+    }
+    fn end_pulse(&mut self) {}
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
         let settings = ControllerSettings::from_bytes(bytes).map_err(|_| NotSaved)?;
         self.saved.push(settings.get(Axis::Theta, Key::Telemetry));

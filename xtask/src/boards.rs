@@ -121,7 +121,12 @@ pub fn folders(root: &Path) -> Result<Vec<PathBuf>> {
 
 /// The program of the board that runs in QEMU.
 pub fn qemu_elf(root: &Path) -> Result<PathBuf> {
-    program_of(&root.join("firmware/boards").join(QEMU_BOARD))
+    elf(root, QEMU_BOARD)
+}
+
+/// The program of a board, by its name.
+pub fn elf(root: &Path, board: &str) -> Result<PathBuf> {
+    program_of(&root.join("firmware/boards").join(board))
 }
 
 /// The program of a board: each is named after its folder.

@@ -16,8 +16,8 @@ pub struct Budget {
 /// machine beside the firmware, so that its size says nothing about a chip.
 pub fn budget_of(board: &str) -> Option<Budget> {
     (board != "qemu-mps2").then_some(Budget {
-        flash: 64 * 1024,
-        ram: 16 * 1024,
+        flash: 192 * 1024,
+        ram: 32 * 1024,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::table::Table;
 use crate::tools::{cargo, install, install_library, root, run};
-use crate::{boards, book, doors, figures, fuzz, imports, length, links, systems};
+use crate::{boards, book, doors, figures, fuzz, image, imports, length, links, systems};
 use anyhow::{Result, bail};
 use std::path::Path;
 use std::process::Command;
@@ -46,6 +46,7 @@ pub fn doors() -> Result<()> {
 fn check_doors(table: &mut Table, root: &Path) -> Result<()> {
     let mut workspaces = vec![root.to_owned(), root.join("protocol/fuzz")];
     workspaces.extend(boards::folders(root)?);
+    workspaces.push(image::folder(root));
     // All three, so that one run names all that is to be done.
     let outcomes = [
         table.step("doors between crates", || doors::check(&workspaces)),
@@ -78,6 +79,7 @@ fn read_sources(table: &mut Table, root: &Path) -> Result<()> {
         for board in boards::folders(root)? {
             run(cargo(&board).args(["fmt", "--check"]))?;
         }
+        run(cargo(&image::folder(root)).args(["fmt", "--check"]))?;
         Ok(())
     })
 }
@@ -109,6 +111,7 @@ fn compile(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
 fn compile_others(table: &mut Table, root: &Path) -> Result<()> {
     table.step("boards", || boards::build_all(root))?;
     table.step("size of the boards", || boards::check_sizes(root))?;
+    table.step("build of the emulated chip", || image::build(root))?;
     match fuzz::missing() {
         None => table.step("build of the fuzzers", || fuzz::build(root)),
         Some(_) => Ok(()),
@@ -141,6 +144,9 @@ fn run_others(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
         command.args(["--", "--ignored"]).args(flags);
         command
     };
+    table.step("the image that is flashed, on an emulated chip", || {
+        image::run_rows(root, &[])
+    })?;
     table.step("sessions that are killed", || {
         run(&mut ignored(
             &["capture"],

@@ -42,6 +42,8 @@ pub struct AxisDrive {
     /// Steps and encoder at home.
     home: Option<(i64, i64)>,
     gear: GearMap,
+    /// The direction output is low for up.
+    is_reversed: bool,
     steps_per_turn: i64,
     encoder: Encoder,
     following_udeg: i32,
@@ -53,6 +55,8 @@ pub struct AxisDrive {
 #[derive(Debug, Default)]
 struct Encoder {
     map: ErrorMap,
+    /// It counts up when the axis turns down.
+    is_reversed: bool,
     /// The count at 0°.
     zero: i64,
     raw: Option<u32>,
@@ -87,9 +91,11 @@ impl AxisDrive {
             base_udeg: 0,
             home: None,
             gear: GearMap::new(axis, settings),
+            is_reversed: settings.get(axis, Key::MotorReversed) != 0,
             steps_per_turn: i64::from(settings.get(axis, Key::StepsPerTurn)),
             encoder: Encoder {
                 map: ErrorMap::new(axis, settings),
+                is_reversed: settings.get(axis, Key::EncoderReversed) != 0,
                 zero: i64::from(settings.get(axis, Key::EncoderZero)),
                 ..Encoder::default()
             },
@@ -140,7 +146,8 @@ impl AxisDrive {
     /// Takes note of the steps that the timer has given since the last time.
     pub fn take_progress(&mut self, hardware: &mut impl Hardware) {
         let progress = hardware.progress(self.axis);
-        self.steps += i64::from(progress.given.wrapping_sub(self.given));
+        let given = i64::from(progress.given.wrapping_sub(self.given));
+        self.steps += if self.is_reversed { -given } else { given };
         self.given = progress.given;
         self.is_playing = progress.is_playing;
     }
@@ -162,7 +169,7 @@ impl AxisDrive {
             let mut ticks = interval;
             if self.queued_forward != Some(self.forward) {
                 self.queued_forward = Some(self.forward);
-                push(interval / 2, End::Turn(self.forward));
+                push(interval / 2, End::Turn(self.forward != self.is_reversed));
                 ticks -= interval / 2;
             }
             push(
@@ -258,7 +265,15 @@ impl AxisDrive {
     ) -> Result<EncoderReading, FaultCode> {
         let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
         let encoder = &mut self.encoder;
-        let (counts, fault) = match hardware.encoder_counts(self.axis) {
+        let reading = hardware.encoder_counts(self.axis, turn as u32);
+        let reading = match reading {
+            // Count 0 stays where it is.
+            Ok(raw) if encoder.is_reversed && raw > 0 && i64::from(raw) < turn => {
+                Ok(turn as u32 - raw)
+            }
+            reading => reading,
+        };
+        let (counts, fault) = match reading {
             Ok(raw) if i64::from(raw) < turn => {
                 let Some(last_raw) = encoder.raw else {
                     // The first reading: somewhere within half a turn of 0, until homing.
@@ -357,6 +372,10 @@ impl AxisDrive {
     pub fn apply(&mut self, settings: &ControllerSettings) {
         self.steps_per_turn = i64::from(settings.get(self.axis, Key::StepsPerTurn));
         self.encoder.map = ErrorMap::new(self.axis, settings);
+        self.encoder.is_reversed = settings.get(self.axis, Key::EncoderReversed) != 0;
+        self.is_reversed = settings.get(self.axis, Key::MotorReversed) != 0;
+        // Which way the direction output stands may mean the other way now.
+        self.queued_forward = None;
         self.gear = GearMap::new(self.axis, settings);
         self.encoder.zero = i64::from(settings.get(self.axis, Key::EncoderZero));
         self.home = None;

@@ -17,8 +17,8 @@ pub enum Wake {
     Time,
     /// So many bytes of the wire are in the buffer.
     Bytes(usize),
-    /// The other controller has raised the trigger wire.
-    TriggerEdge,
+    /// The other controller raised the trigger wire at this time, µs.
+    TriggerEdge(u64),
 }
 
 /// Clock, wire and pins of one controller.
@@ -55,9 +55,9 @@ pub async fn run(node: &mut ControllerNode, board: &mut impl Board) -> ! {
         }
         match board.sleep(node.wake_us(), &mut bytes).await {
             Wake::Time => {}
-            Wake::TriggerEdge => {
+            Wake::TriggerEdge(edge_us) => {
                 let now_us = board.now_us();
-                node.trigger_edge(now_us, board.pins(now_us));
+                node.trigger_edge(now_us, edge_us, board.pins(now_us));
             }
             Wake::Bytes(received) => {
                 for &byte in bytes.iter().take(received) {
@@ -108,7 +108,7 @@ mod tests {
             StepProgress::default()
         }
         fn halt(&mut self, _: Axis) {}
-        fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
+        fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
             Ok(1000)
         }
         fn home_switch_closed(&mut self, _: Axis) -> bool {
@@ -118,7 +118,10 @@ mod tests {
             true
         }
         fn hold_interlock_open(&mut self, _: bool) {}
-        fn set_trigger(&mut self, _: bool) {}
+        fn begin_pulse(&mut self, now_us: u64, _: u32) -> u64 {
+            now_us
+        }
+        fn end_pulse(&mut self) {}
         fn save_settings(&mut self, _: &[u8]) -> Result<(), NotSaved> {
             Ok(())
         }

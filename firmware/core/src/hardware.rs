@@ -24,8 +24,8 @@ pub trait Hardware {
     /// No step of this axis after this; whatever waits is dropped.
     fn halt(&mut self, axis: Axis);
 
-    /// The absolute encoder of the shaft, in counts of one turn.
-    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost>;
+    /// The absolute encoder of the shaft, in counts of one turn, of which there are so many.
+    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost>;
 
     /// Whether the home switch is closed: it is at and below the home angle.
     fn home_switch_closed(&mut self, axis: Axis) -> bool;
@@ -33,11 +33,16 @@ pub trait Hardware {
     /// Whether the interlock that both controllers share is closed, so that motion is allowed.
     fn interlock_closed(&mut self) -> bool;
 
-    /// Holds the shared interlock open, which stops the other controller too, or lets go of it.
+    /// Holds the shared interlock open, which stops the other controller too, or lets go of it. Letting go
+    /// takes as long as the relay: when this returns, [`Self::interlock_closed`] reads its contact.
     fn hold_interlock_open(&mut self, open: bool);
 
-    /// Sets the trigger output.
-    fn set_trigger(&mut self, on: bool);
+    /// Gives a trigger pulse of so many µs, which begins at once or as soon as a timer can and ends by itself.
+    /// Returns when it begins, µs since the start.
+    fn begin_pulse(&mut self, now_us: u64, length_us: u32) -> u64;
+
+    /// The trigger output is low from here on; a pulse under way is cut short.
+    fn end_pulse(&mut self);
 
     /// Writes settings to the board's memory: whole, or not at all.
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved>;

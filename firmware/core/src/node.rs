@@ -83,10 +83,10 @@ impl ControllerNode {
         }
     }
 
-    /// The other controller has raised the trigger wire.
+    /// The other controller raised the trigger wire at `edge_us`.
     #[inline(never)] // Flash: apart from the state machine of the main task, code is smaller.
-    pub fn trigger_edge(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        self.controller.trigger_edge(now_us, hardware);
+    pub fn trigger_edge(&mut self, now_us: u64, edge_us: u64, hardware: &mut impl Hardware) {
+        self.controller.trigger_edge(now_us, edge_us, hardware);
         self.collect_events();
     }
 

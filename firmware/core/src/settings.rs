@@ -19,7 +19,10 @@ pub struct ControllerSettings {
     values: [[i32; 2]; N_SETTINGS],
 }
 
-/// A value out of range, or one that contradicts another.
+/// Steps a second that the step timers' interrupts and the queue in front of them keep up with, on both axes.
+pub const MOST_STEPS_S: u64 = 50_000;
+
+/// A value out of range, or one that contradicts another or what the board can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BadValue;
 
@@ -106,7 +109,13 @@ impl ControllerSettings {
             let in_range = MEANINGS
                 .iter()
                 .all(|m| (m.min..=m.max).contains(&get(m.key)));
-            let consistent = get(Key::SoftMin) < get(Key::SoftMax)
+            let steps_s = self.get_u64(axis, Key::StepsPerTurn) * self.get_u64(axis, Key::MaxSpeed)
+                / 360_000_000;
+            let consistent = steps_s <= MOST_STEPS_S
+                && self
+                    .get_u64(axis, Key::EncoderCountsPerTurn)
+                    .is_power_of_two()
+                && get(Key::SoftMin) < get(Key::SoftMax)
                 && get(Key::HomeAngle) <= get(Key::SoftMin)
                 && get(Key::EncoderZero) < get(Key::EncoderCountsPerTurn)
                 && get(Key::HomeSlowSpeed) <= get(Key::HomeFastSpeed)
@@ -181,9 +190,16 @@ mod tests {
             (Key::HomeAngle, 0),
             (Key::TriggerWindow, 31_000),
             (Key::InPositionWindow, i32::MIN),
+            // 15°/s would be 50,001 steps/s.
+            (Key::StepsPerTurn, 1_200_024),
+            (Key::EncoderCountsPerTurn, (1 << 18) + 1),
+            (Key::MotorReversed, 2),
         ] {
             assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue));
         }
         assert_eq!(settings, ControllerSettings::default());
+        settings
+            .set(Axis::Theta, Key::StepsPerTurn, 1_200_000)
+            .unwrap();
     }
 }

@@ -23,10 +23,10 @@ enum TrainPhase {
 pub enum TrainAction {
     /// Nothing before its next due time.
     None,
-    /// Latch, and raise the output.
-    Raise,
-    /// Lower the output.
-    Lower,
+    /// Latch, and give a pulse of so many µs.
+    Give(u32),
+    /// The pulse is over.
+    Over,
 }
 
 impl TriggerTrain {
@@ -72,7 +72,7 @@ impl TriggerTrain {
         self.phase = TrainPhase::Low { until_us: now_us };
     }
 
-    /// Keeps a latch; the exposure of its pulse begins.
+    /// Keeps a latch; the exposure of its pulse has begun.
     pub fn latch(&mut self, latch: Latch) {
         let exposure = self.wanted.exposures_us.get(self.latches.len());
         if let (TriggerRole::Source, Some(&us)) = (self.wanted.trigger, exposure) {
@@ -103,9 +103,12 @@ impl TriggerTrain {
                         until_us: now_us + u64::from(self.wanted.gap_us),
                     }
                 };
-                TrainAction::Lower
+                TrainAction::Over
             }
-            TrainPhase::Low { until_us } if now_us >= until_us => TrainAction::Raise,
+            TrainPhase::Low { until_us } if now_us >= until_us => {
+                let exposure = self.wanted.exposures_us.get(self.latches.len());
+                exposure.map_or(TrainAction::None, |&us| TrainAction::Give(us))
+            }
             _ => TrainAction::None,
         }
     }

@@ -30,7 +30,7 @@ impl Hardware for Pins {
         }
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
         match self.sensors & 3 {
             0 => Err(EncoderLost),
             1 => Ok(u32::MAX),
@@ -44,7 +44,10 @@ impl Hardware for Pins {
         self.sensors & 0x38 != 0x38
     }
     fn hold_interlock_open(&mut self, _: bool) {}
-    fn set_trigger(&mut self, _: bool) {}
+    fn begin_pulse(&mut self, now_us: u64, _: u32) -> u64 {
+        now_us
+    }
+    fn end_pulse(&mut self) {}
     fn save_settings(&mut self, _: &[u8]) -> Result<(), NotSaved> {
         if self.sensors & 0x40 == 0 {
             Ok(())

@@ -33,8 +33,8 @@ impl Hardware for EmulatedArm {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
-        self.0.encoder_counts(axis)
+    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost> {
+        self.0.encoder_counts(axis, turn)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
@@ -49,8 +49,12 @@ impl Hardware for EmulatedArm {
         self.0.hold_interlock_open(open);
     }
 
-    fn set_trigger(&mut self, on: bool) {
-        self.0.set_trigger(on);
+    fn begin_pulse(&mut self, now_us: u64, length_us: u32) -> u64 {
+        self.0.begin_pulse(now_us, length_us)
+    }
+
+    fn end_pulse(&mut self) {
+        self.0.end_pulse();
     }
 
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {

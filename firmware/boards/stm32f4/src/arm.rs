@@ -1,6 +1,6 @@
 //! Everything that one arm's controller is wired to.
 
-use embassy_stm32::gpio::{Input, Output};
+use embassy_stm32::gpio::Input;
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::spi::Spi;
 use embassy_stm32::spi::mode::Master;
@@ -11,7 +11,7 @@ use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
 use crate::sectors::FlashSectors;
-use crate::{now_us, steps};
+use crate::{alive, now_us, pulses, steps};
 
 /// Pins, encoders and memory; the drivers are with the step timers. Pairs are θ and φ.
 pub struct ArmPins {
@@ -21,14 +21,23 @@ pub struct ArmPins {
     pub home_switches: [Input<'static>; 2],
     /// To ground while the chain is closed, so that a cut wire stops the arm.
     pub interlock: Input<'static>,
-    /// High: a relay opens the chain.
-    pub interlock_relay: Output<'static>,
-    /// To the camera and to the other arm.
-    pub trigger: Output<'static>,
     /// Settings.
     pub store: Store,
     /// Where they are kept.
     pub sectors: FlashSectors,
+}
+
+/// A relay's contact follows its coil within 5 to 10 ms; twice that is enough.
+const RELAY_US: u64 = 20_000;
+
+impl ArmPins {
+    /// Waits until the relay has had its time, or the chain is closed. Nothing moves meanwhile.
+    pub fn await_chain(&self) {
+        let until_us = now_us() + RELAY_US;
+        while self.interlock.is_high() && now_us() < until_us {
+            alive::keep();
+        }
+    }
 }
 
 impl Hardware for ArmPins {
@@ -44,8 +53,8 @@ impl Hardware for ArmPins {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis) -> Result<u32, EncoderLost> {
-        self.encoders[axis.index()].counts(now_us())
+    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost> {
+        self.encoders[axis.index()].counts(now_us(), turn)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
@@ -57,11 +66,18 @@ impl Hardware for ArmPins {
     }
 
     fn hold_interlock_open(&mut self, open: bool) {
-        self.interlock_relay.set_level(open.into());
+        alive::hold_open(open);
+        if !open {
+            self.await_chain();
+        }
     }
 
-    fn set_trigger(&mut self, on: bool) {
-        self.trigger.set_level(on.into());
+    fn begin_pulse(&mut self, _: u64, length_us: u32) -> u64 {
+        pulses::begin(length_us)
+    }
+
+    fn end_pulse(&mut self) {
+        pulses::end();
     }
 
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {

@@ -4,45 +4,55 @@
 //!
 //! | function | pin | Nucleo |
 //! |---|---|---|
-//! | wire to the host: USART2, 921,600 baud, through the ST-Link's USB | PA2, PA3 | – |
+//! | wire to the host: USART2, through the ST-Link's USB | PA2, PA3 | – |
 //! | θ: step (TIM5), direction | PA0, PA9 | A0, D8 |
 //! | φ: step (TIM2), direction | PB10, PB4 | D6, D5 |
 //! | θ encoder (SSI): clock, data | PA5, PA6 | D13, D12 |
 //! | φ encoder (SSI): clock, data | PB13, PB14 | CN10-30, CN10-28 |
 //! | home switches θ, φ (to ground when closed) | PC0, PC1 | A5, A4 |
-//! | interlock chain (to ground when closed), relay that opens it | PC2, PC3 | CN7-35, CN7-37 |
-//! | trigger out, trigger in from the other arm | PB5, PC7 | D4, D9 |
+//! | interlock chain (to ground when closed) | PC2 | CN7-35 |
+//! | interlock relay (TIM8, high: its contact closes this arm's part of the chain) | PC6 | CN10-4 |
+//! | drivers' current (high: on) | PC3 | CN7-37 |
+//! | trigger out, trigger in from the other arm (both TIM3) | PB5, PC8 | D4, CN10-2 |
 //! | camera arm: jumper to ground; light arm: open | PB0 | A3 |
 //!
-//! Settings: flash sectors 6 and 7. Log: defmt over RTT (`cargo run --release` with probe-rs).
+//! In reset every pin floats: the pull-downs of `docs/src/guides/arms.md` hold the outputs low, which is no
+//! step, no trigger, no current, and the chain open.
+//!
+//! Settings: flash sectors 1 and 2. Log: defmt over RTT (`cargo run --release` with probe-rs).
 #![no_std]
 #![no_main]
 
+mod alive;
 mod arm;
+mod pulses;
 mod sectors;
 mod steps;
+mod time;
 
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::SCB;
 use cortex_m::singleton;
+use cortex_m_rt::{ExceptionFrame, exception};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_futures::select::{Either3, select3};
-use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
-use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::{TIM2, TIM5};
+use embassy_stm32::interrupt::Priority;
+use embassy_stm32::interrupt::typelevel::{Interrupt, USART2};
+use embassy_stm32::peripherals::{TIM2, TIM3, TIM5, TIM8};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
 use embassy_stm32::spi::{self, MODE_2, Spi};
 use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::input_capture::CapturePin;
 use embassy_stm32::timer::simple_pwm::PwmPin;
-use embassy_stm32::timer::{Ch1, Ch3};
+use embassy_stm32::timer::{Ch1, Ch2, Ch3};
 use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config as UartConfig};
-use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, bind_interrupts, exti, interrupt, pac, peripherals, usart};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
+use embassy_stm32::{Peri, bind_interrupts, pac, peripherals, usart};
 use embassy_time::{Instant, Timer};
 use embedded_io_async::{Read, Write};
 use gonia_firmware::board::{self, Board, Wake};
@@ -51,8 +61,7 @@ use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::ssi::SsiEncoder;
 use gonia_firmware::store::Store;
 use gonia_protocol::message::ResetReason;
-use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
-use panic_persist as _;
+use gonia_protocol::{BAUD, NODE_CAMERA, NODE_LIGHT};
 use static_cell::StaticCell;
 
 use crate::arm::ArmPins;
@@ -60,49 +69,49 @@ use crate::sectors::FlashSectors;
 
 bind_interrupts!(struct Interrupts {
     USART2 => usart::BufferedInterruptHandler<peripherals::USART2>;
-    EXTI9_5 => exti::InterruptHandler<interrupt::typelevel::EXTI9_5>;
 });
 
-/// The other arm has raised the trigger wire.
-static TRIGGERED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-
-const BAUD: u32 = 921_600;
-/// Longer than erasing a sector of flash takes.
-const WATCHDOG_US: u32 = 8_000_000;
+/// Clock of both rings, Hz: what 50 m of cable allow, and dividers make of both buses' clocks exactly (84 MHz
+/// by 256, 42 MHz by 128).
+const SSI_HZ: u32 = 328_125;
+/// A pin whose pull-up has just been switched on is high after this, cycles of the processor: 50 µs, for 1 nF
+/// of cable at 40 kΩ.
+const PULL_UP_CYCLES: u32 = 8_400;
 
 #[embassy_executor::main]
-async fn main(spawner: Spawner) {
+async fn main(_spawner: Spawner) {
     let reset = take_reset_reason();
     let p = embassy_stm32::init(clocks());
+    switch_on_caches();
+    time::start();
 
     let mut sectors = FlashSectors(Flash::new_blocking(p.FLASH));
     let (store, settings) = Store::open(&mut sectors);
     let output = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Medium);
     let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
-    let address = match Input::new(p.PB0, Pull::Up).is_low() {
-        true => NODE_CAMERA,
-        false => NODE_LIGHT,
+    let is_camera = {
+        let jumper = Input::new(p.PB0, Pull::Up);
+        cortex_m::asm::delay(PULL_UP_CYCLES);
+        jumper.is_low()
     };
+    let address = if is_camera { NODE_CAMERA } else { NODE_LIGHT };
     let theta = Spi::new_blocking_rxonly(p.SPI1, p.PA5, p.PA6, ssi_config());
     let phi = Spi::new_blocking_rxonly(p.SPI2, p.PB13, p.PB14, ssi_config());
     // A dropped pin goes back to an input: these stay with their timers.
     core::mem::forget(PwmPin::<TIM5, Ch1>::new(p.PA0, OutputType::PushPull));
     core::mem::forget(PwmPin::<TIM2, Ch3>::new(p.PB10, OutputType::PushPull));
+    core::mem::forget(PwmPin::<TIM3, Ch2>::new(p.PB5, OutputType::PushPull));
+    core::mem::forget(CapturePin::<TIM3, Ch3>::new(p.PC8, Pull::Down));
+    core::mem::forget(PwmPin::<TIM8, Ch1>::new(p.PC6, OutputType::PushPull));
+    pulses::start();
     steps::start([output(p.PA9.into()), output(p.PB4.into())]);
     let pins = ArmPins {
         encoders: [SsiEncoder::new(theta), SsiEncoder::new(phi)],
         home_switches: [switch(p.PC0.into()), switch(p.PC1.into())],
         interlock: switch(p.PC2.into()),
-        interlock_relay: output(p.PC3.into()),
-        trigger: output(p.PB5.into()),
         store,
         sectors,
     };
-    let trigger_in = ExtiInput::new(p.PC7, p.EXTI7, Pull::Down, Interrupts);
-    match watch_trigger(trigger_in) {
-        Ok(task) => spawner.spawn(task),
-        Err(_) => defmt::panic!("main runs once"),
-    }
 
     let (Some(tx), Some(rx)) = (
         singleton!(: [u8; 2048] = [0; 2048]),
@@ -117,20 +126,24 @@ async fn main(spawner: Spawner) {
         defmt::panic!("USART2 cannot do {} baud", BAUD);
     };
     let (to_host, from_host) = uart.split();
+    // Behind the steps' and the trigger's.
+    USART2::set_priority(Priority::P4);
 
     static NODE: StaticCell<ControllerNode> = StaticCell::new();
+    alive::start();
+    pins.await_chain();
+    let mut drivers = output(p.PC3.into());
+    drivers.set_high();
+    core::mem::forget(drivers);
     let controller = ArmController::new(now_us(), settings.as_deref());
     let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
     let identity = identity("stm32f4", board::next_boot_id(), reset, last_panic);
     let node = NODE.init(ControllerNode::new(address, identity, controller));
-    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
-    watchdog.unleash();
     defmt::info!("ready, address {}", address);
     let mut nucleo = Nucleo {
         pins,
         to_host,
         from_host,
-        watchdog,
     };
     board::run(node, &mut nucleo).await
 }
@@ -140,7 +153,6 @@ struct Nucleo {
     pins: ArmPins,
     to_host: BufferedUartTx<'static>,
     from_host: BufferedUartRx<'static>,
-    watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
 }
 
 impl Board for Nucleo {
@@ -162,10 +174,11 @@ impl Board for Nucleo {
     }
 
     async fn sleep(&mut self, until_us: u64, bytes: &mut [u8]) -> Wake {
-        self.watchdog.pet();
-        let time = Timer::at(Instant::from_micros(until_us));
-        match select3(TRIGGERED.wait(), self.from_host.read(bytes), time).await {
-            Either3::First(()) => Wake::TriggerEdge,
+        alive::keep();
+        let round_us = now_us() + alive::ROUND_US;
+        let time = Timer::at(Instant::from_micros(until_us.min(round_us)));
+        match select3(pulses::EDGES.receive(), self.from_host.read(bytes), time).await {
+            Either3::First(edge_us) => Wake::TriggerEdge(edge_us),
             Either3::Second(Ok(received)) => Wake::Bytes(received),
             // Noise on the line, or too much of it: the packet's checksum shows it, the host repeats.
             Either3::Second(Err(_)) | Either3::Third(()) => Wake::Time,
@@ -173,20 +186,37 @@ impl Board for Nucleo {
     }
 }
 
-/// A task of its own, so that no edge falls between two looks at the pin.
-#[embassy_executor::task]
-async fn watch_trigger(mut pin: ExtiInput<'static, Async>) {
-    loop {
-        pin.wait_for_rising_edge().await;
-        TRIGGERED.signal(());
-    }
+/// Caches and prefetch: without them the processor waits five cycles for most of its instructions.
+fn switch_on_caches() {
+    pac::FLASH.acr().modify(|w| {
+        w.set_icen(true);
+        w.set_dcen(true);
+        w.set_prften(true);
+    });
 }
 
-/// SPI settings that speak SSI at 1 MHz, which 50 m of cable allow.
+/// The processor cannot go on: what moves is stopped first.
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    alive::all_off();
+    defmt::error!("hard fault at {:#010x}", frame.pc());
+    panic!("hard fault at {:#010x}", frame.pc())
+}
+
+/// What moves is stopped; the message is kept for the next `hello`, and the chip starts anew.
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    cortex_m::interrupt::disable();
+    alive::all_off();
+    panic_persist::report_panic_info(info);
+    SCB::sys_reset()
+}
+
+/// SPI settings that speak SSI.
 fn ssi_config() -> spi::Config {
     let mut config = spi::Config::default();
     config.mode = MODE_2;
-    config.frequency = Hertz(1_000_000);
+    config.frequency = Hertz(SSI_HZ);
     config
 }
 

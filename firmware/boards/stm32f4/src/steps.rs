@@ -2,7 +2,8 @@
 //!
 //! PWM mode 1: a period begins with a pulse of fixed width, or with none where the compare value is 0.
 //! Reload and compare values are preloaded, so that edges come at their time as long as the interrupt
-//! of a period runs before the period is over.
+//! of a period runs before the period is over. Both count only while TIM8 runs (`alive`): a timer whose
+//! interrupt no longer comes would repeat its last period for ever.
 
 use core::cell::RefCell;
 
@@ -11,7 +12,7 @@ use embassy_stm32::gpio::Output;
 use embassy_stm32::interrupt::typelevel::{Interrupt, TIM2, TIM5};
 use embassy_stm32::interrupt::{self, Priority};
 use embassy_stm32::pac;
-use embassy_stm32::pac::timer::vals::{Ocm, Urs};
+use embassy_stm32::pac::timer::vals::{Ocm, Sms, Ts, Urs};
 use embassy_stm32::peripherals;
 use embassy_stm32::rcc;
 use gonia_firmware::steps::{Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
@@ -27,9 +28,10 @@ type Channel = Mutex<RefCell<Option<StepChannel<PulseTimer>>>>;
 /// θ and φ.
 static CHANNELS: [Channel; 2] = [const { Mutex::new(RefCell::new(None)) }; 2];
 
-/// A timer, its compare channel, and the direction pin of the driver.
+/// A timer, which of its internal triggers TIM8 is, its compare channel, and the direction pin of the driver.
 pub struct PulseTimer {
     registers: pac::timer::TimGp32,
+    gate: Ts,
     compare: usize,
     direction: Output<'static>,
 }
@@ -38,11 +40,13 @@ pub struct PulseTimer {
 pub fn start(directions: [Output<'static>; 2]) {
     rcc::enable_and_reset::<peripherals::TIM5>();
     rcc::enable_and_reset::<peripherals::TIM2>();
-    let timers = [(pac::TIM5, 0), (pac::TIM2, 2)];
-    for ((channel, (registers, compare)), direction) in CHANNELS.iter().zip(timers).zip(directions)
+    let timers = [(pac::TIM5, Ts::ITR3, 0), (pac::TIM2, Ts::ITR1, 2)];
+    for ((channel, (registers, gate, compare)), direction) in
+        CHANNELS.iter().zip(timers).zip(directions)
     {
         let mut timer = PulseTimer {
             registers,
+            gate,
             compare,
             direction,
         };
@@ -113,6 +117,10 @@ impl PulseTimer {
         registers.cr1().write(|w| {
             w.set_arpe(true);
             w.set_urs(Urs::COUNTER_ONLY);
+        });
+        registers.smcr().write(|w| {
+            w.set_ts(self.gate);
+            w.set_sms(Sms::GATED_MODE);
         });
         registers.ccmr_output(compare / 2).modify(|w| {
             w.set_ocm(compare % 2, Ocm::PWM_MODE1);

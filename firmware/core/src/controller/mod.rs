@@ -228,7 +228,7 @@ impl ArmController {
 
     fn emergency_stop(&mut self, now_us: u64, hardware: &mut impl Hardware) {
         self.halt(hardware);
-        hardware.set_trigger(false);
+        hardware.end_pulse();
         // Stopping at once may have lost steps.
         self.homed = false;
         self.note_fault(now_us, FaultCode::INTERLOCK_OPEN, None);
@@ -249,7 +249,7 @@ impl ArmController {
         ) {
             return;
         }
-        hardware.set_trigger(false);
+        hardware.end_pulse();
         if code == FaultCode::HOST_WATCHDOG {
             self.drives.iter_mut().for_each(AxisDrive::decelerate);
         } else {

@@ -12,7 +12,7 @@ use crate::settling::{SettlingLimits, SettlingMonitor, SettlingResult};
 
 impl ArmController {
     pub(super) fn tick_homing(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        if self.finish_stop(now_us) || !self.check_following(now_us, hardware) {
+        if !self.check_following(now_us, hardware) || self.finish_stop(now_us) {
             return;
         }
         for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
@@ -38,7 +38,7 @@ impl ArmController {
     }
 
     pub(super) fn tick_motion(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        if self.finish_stop(now_us) || !self.check_following(now_us, hardware) {
+        if !self.check_following(now_us, hardware) || self.finish_stop(now_us) {
             return;
         }
         let mut reached = true;

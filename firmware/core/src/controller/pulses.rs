@@ -9,8 +9,8 @@ use crate::hardware::Hardware;
 use crate::train::TrainAction;
 
 impl ArmController {
-    /// The other controller has raised the trigger wire.
-    pub fn trigger_edge(&mut self, now_us: u64, hardware: &mut impl Hardware) {
+    /// The other controller raised the trigger wire at `edge_us`.
+    pub fn trigger_edge(&mut self, now_us: u64, edge_us: u64, hardware: &mut impl Hardware) {
         let follows = self
             .train
             .as_ref()
@@ -19,7 +19,7 @@ impl ArmController {
             return;
         }
         let outside = self.axis_outside_window(now_us, hardware);
-        self.latch(now_us, outside.is_none());
+        self.latch(edge_us, outside.is_none());
         if let Some(train) = &self.train
             && train.is_over()
         {
@@ -34,19 +34,19 @@ impl ArmController {
         let Some(train) = &mut self.train else { return };
         match train.due(now_us) {
             TrainAction::None => {}
-            TrainAction::Raise => match self.axis_outside_window(now_us, hardware) {
+            TrainAction::Give(length_us) => match self.axis_outside_window(now_us, hardware) {
                 Some((axis, _)) => {
                     self.train = None;
                     self.enter(ControllerState::Idle, now_us);
                     self.complete(RequestOutcome::LeftWindow(axis));
                 }
                 None => {
-                    self.latch(now_us, true);
-                    hardware.set_trigger(true);
+                    let begins_us = hardware.begin_pulse(now_us, length_us);
+                    self.latch(begins_us, true);
                 }
             },
-            TrainAction::Lower => {
-                hardware.set_trigger(false);
+            TrainAction::Over => {
+                hardware.end_pulse();
                 if train.is_over() {
                     self.enter(ControllerState::Idle, now_us);
                     self.complete(RequestOutcome::Done);
@@ -56,7 +56,7 @@ impl ArmController {
     }
 
     /// Keeps the encoders that were read just now.
-    fn latch(&mut self, now_us: u64, within: bool) {
+    fn latch(&mut self, time_us: u64, within: bool) {
         let seq = self.next_seq();
         let encoder_udeg = [self.drives[0].encoder_udeg(), self.drives[1].encoder_udeg()];
         let Some(train) = &mut self.train else { return };
@@ -64,7 +64,7 @@ impl ArmController {
             seq,
             request: train.request(),
             pulse: train.latches().len() as u8,
-            time_us: now_us,
+            time_us,
             encoder_udeg,
             within,
         };

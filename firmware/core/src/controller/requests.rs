@@ -89,9 +89,10 @@ impl ArmController {
                 }
             }
             ControllerState::Fault(code) => {
-                let lost = Axis::BOTH
-                    .iter()
-                    .any(|&axis| hardware.encoder_counts(axis).is_err());
+                let lost = Axis::BOTH.iter().any(|&axis| {
+                    let turn = self.settings.get_u64(axis, Key::EncoderCountsPerTurn);
+                    hardware.encoder_counts(axis, turn as u32).is_err()
+                });
                 if lost {
                     return Err(RequestRefusal::CauseRemains(code));
                 }
@@ -192,7 +193,7 @@ impl ArmController {
 
     fn disarm(&mut self, now_us: u64, hardware: &mut impl Hardware) -> Answer {
         if self.state == ControllerState::Armed {
-            hardware.set_trigger(false);
+            hardware.end_pulse();
             self.train = None;
             self.enter(ControllerState::Idle, now_us);
             self.complete(RequestOutcome::Stopped);
@@ -234,7 +235,12 @@ impl ArmController {
         // What an angle *means* has changed: the old zero is worth nothing.
         if matches!(
             key,
-            Key::StepsPerTurn | Key::EncoderCountsPerTurn | Key::EncoderZero | Key::HomeAngle
+            Key::StepsPerTurn
+                | Key::EncoderCountsPerTurn
+                | Key::EncoderZero
+                | Key::HomeAngle
+                | Key::MotorReversed
+                | Key::EncoderReversed
         ) || Key::ERROR_MAP.contains(&key)
             || Key::GEAR_MAP.contains(&key)
         {

@@ -1,0 +1,118 @@
+//! What keeps the arm safe when the processor does not: hardware that stops pulses and opens the chain by
+//! itself, and a watchdog.
+//!
+//! TIM8 runs for 10 ms and stops (one-pulse mode); the main loop sets it back every round. While it runs, its
+//! trigger output lets TIM5 and TIM2 count, which give the steps, and its channel 1 holds the interlock's
+//! relay. So whatever stops the processor (a fault in a fault handler, a loop without end, a debugger) stops
+//! the steps within 10 ms, and the relay lets go. The watchdog restarts the chip soon after.
+
+use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+use embassy_stm32::pac::timer::vals::{Mms, Ocm, Urs};
+use embassy_stm32::pac::{self};
+use embassy_stm32::{peripherals, rcc};
+
+use crate::pulses;
+
+/// The main loop comes round at least this often, µs.
+pub const ROUND_US: u64 = 4_000;
+/// TIM8 counts at 10 kHz.
+const PRESCALER: u16 = 16_800;
+/// 10 ms.
+const STEPS_END: u16 = 100;
+/// 2 s, for an erase: at rest.
+const STRETCHED: u16 = 20_000;
+/// Of the watchdog, whose clock is somewhere between 17 and 47 kHz: 100 ms and 2 s at 32 kHz.
+const WATCHDOG: u16 = 100;
+const WATCHDOG_STRETCHED: u16 = 2_000;
+/// The output is high from this count on: as soon as the timer runs.
+const ENERGISED: u16 = 1;
+/// The count that it never reaches.
+const OPEN: u16 = u16::MAX;
+/// The pin PC3, which gives the drivers their current.
+const DRIVERS: usize = 3;
+
+/// Starts the timer and the watchdog; the relay closes, and steps can be given.
+pub fn start() {
+    // A debugger that halts the processor halts these too: no step, no relay, no reset meanwhile.
+    pac::DBGMCU.apb1fzr().modify(|w| {
+        w.set_tim2(true);
+        w.set_tim3(true);
+        w.set_tim4(true);
+        w.set_tim5(true);
+        w.set_iwdg(true);
+    });
+    pac::DBGMCU.apb2fzr().modify(|w| w.set_tim8(true));
+
+    rcc::enable_and_reset::<peripherals::TIM8>();
+    let tim = pac::TIM8;
+    tim.psc().write_value(PRESCALER - 1);
+    tim.arr().write(|w| w.set_arr(STEPS_END));
+    tim.cr2().write(|w| w.set_mms(Mms::ENABLE));
+    tim.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+    tim.ccr(0).write(|w| w.set_ccr(ENERGISED));
+    tim.ccer().write(|w| w.set_cce(0, true));
+    tim.bdtr().write(|w| w.set_moe(true));
+    tim.cr1().write(|w| {
+        w.set_opm(true);
+        w.set_urs(Urs::COUNTER_ONLY);
+    });
+    tim.egr().write(|w| w.set_ug(true));
+
+    pac::IWDG.kr().write(|w| w.set_key(Key::START));
+    set_watchdog(WATCHDOG);
+    keep();
+}
+
+/// The main loop has come round.
+pub fn keep() {
+    run_on();
+    pac::IWDG.kr().write(|w| w.set_key(Key::RESET));
+}
+
+/// Sets TIM8 back to its beginning. Not to zero, where the relay's output is low.
+fn run_on() {
+    pac::TIM8.cnt().write(|w| w.set_cnt(ENERGISED));
+    pac::TIM8.cr1().modify(|w| w.set_cen(true));
+}
+
+/// Holds this controller's part of the chain open, or closes it.
+pub fn hold_open(open: bool) {
+    let count = if open { OPEN } else { ENERGISED };
+    pac::TIM8.ccr(0).write(|w| w.set_ccr(count));
+}
+
+/// Work that takes longer than a round, at rest: nothing moves, so nothing has to be stopped meanwhile.
+pub fn stretched<R>(work: impl FnOnce() -> R) -> R {
+    pac::TIM8.arr().write(|w| w.set_arr(STRETCHED));
+    set_watchdog(WATCHDOG_STRETCHED);
+    keep();
+    let result = work();
+    // The counter is beyond the shorter end by now: first back, then shorter.
+    run_on();
+    pac::TIM8.arr().write(|w| w.set_arr(STEPS_END));
+    set_watchdog(WATCHDOG);
+    keep();
+    result
+}
+
+/// The watchdog's clock takes some of its own cycles to take a new value over.
+fn set_watchdog(reload: u16) {
+    let iwdg = pac::IWDG;
+    iwdg.kr().write(|w| w.set_key(Key::ENABLE));
+    iwdg.pr().write(|w| w.set_pr(Pr::DIVIDE_BY32));
+    iwdg.rlr().write(|w| w.set_rl(reload));
+    while iwdg.sr().read().rvu() || iwdg.sr().read().pvu() {}
+    iwdg.kr().write(|w| w.set_key(Key::RESET));
+}
+
+/// No step, no trigger, no current, the chain open: whatever state the rest is in. Nothing but registers.
+pub fn all_off() {
+    for tim in [pac::TIM5, pac::TIM2] {
+        tim.cr1().write(|_| {});
+        tim.ccer().write(|_| {});
+    }
+    pac::TIM8.bdtr().write(|_| {});
+    pac::TIM8.cr1().write(|_| {});
+    pulses::off();
+    pac::GPIOC.bsrr().write(|w| w.set_br(DRIVERS, true));
+}

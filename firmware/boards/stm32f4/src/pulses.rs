@@ -1,0 +1,160 @@
+//! The trigger wire: pulses out by TIM3's channel 2, and the edges of the other arm's captured by its channel
+//! 3, both in the microseconds that the board's clock counts.
+//!
+//! The timer raises and lowers the output; the interrupt only tells it when. A pulse longer than TIM3 counts
+//! is told in parts.
+
+use core::cell::RefCell;
+
+use critical_section::Mutex;
+use embassy_stm32::interrupt::typelevel::{Interrupt, TIM3 as IRQ};
+use embassy_stm32::interrupt::{self, Priority};
+use embassy_stm32::pac::TIM3;
+use embassy_stm32::pac::timer::regs::SrGp16;
+use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue, Ocm};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use gonia_protocol::message::MAX_PULSES;
+
+use crate::{now_us, time};
+
+/// Channel 2 gives pulses, channel 3 captures edges; counted from 0.
+const OUT: usize = 1;
+const IN: usize = 2;
+/// A pulse begins so long after it was asked for, µs: the registers are written by then.
+const LEAD_US: u64 = 8;
+/// What is left of a pulse is told at once up to this, µs, and in parts of the other beyond it.
+const LONGEST_US: u64 = 60_000;
+const PART_US: u64 = 30_000;
+
+/// Edges of the other arm's trigger, µs since the start.
+pub static EDGES: Channel<CriticalSectionRawMutex, u64, MAX_PULSES> = Channel::new();
+
+/// The pulse under way.
+#[derive(Clone, Copy)]
+enum Pulse {
+    None,
+    /// The output rises at the next match.
+    Rising {
+        ends_us: u64,
+    },
+    /// It is high, and ends beyond what the timer can be told.
+    High {
+        ends_us: u64,
+    },
+    /// It falls at the next match.
+    Falling,
+}
+
+static PULSE: Mutex<RefCell<Pulse>> = Mutex::new(RefCell::new(Pulse::None));
+
+/// Gives TIM3's channels their work; its pins are given to it already.
+pub fn start() {
+    TIM3.ccmr_output(OUT / 2)
+        .modify(|w| w.set_ocm(OUT % 2, Ocm::FORCE_INACTIVE));
+    TIM3.ccmr_input(IN / 2).modify(|w| {
+        w.set_ccs(IN % 2, CcmrInputCcs::TI4);
+        // 8 equal samples at 84 MHz: a spike of 90 ns is none.
+        w.set_icf(IN % 2, FilterValue::FCK_INT_N8);
+    });
+    TIM3.ccer().modify(|w| {
+        w.set_cce(OUT, true);
+        w.set_cce(IN, true);
+    });
+    TIM3.dier().modify(|w| w.set_ccie(IN, true));
+    IRQ::set_priority(Priority::P1);
+    // SAFETY: the handler shares data with the main loop through critical sections only.
+    unsafe { IRQ::enable() };
+}
+
+/// Begins a pulse, and returns when it rises.
+pub fn begin(length_us: u32) -> u64 {
+    critical_section::with(|cs| {
+        let begins_us = now_us() + LEAD_US;
+        let ends_us = begins_us + u64::from(length_us);
+        TIM3.ccr(OUT).write(|w| w.set_ccr(begins_us as u16));
+        set_mode(Ocm::ACTIVE_ON_MATCH);
+        clear(OUT);
+        TIM3.dier().modify(|w| w.set_ccie(OUT, true));
+        PULSE.replace(cs, Pulse::Rising { ends_us });
+        begins_us
+    })
+}
+
+/// The output is low from here on.
+pub fn end() {
+    critical_section::with(|cs| {
+        off();
+        PULSE.replace(cs, Pulse::None);
+    });
+}
+
+/// The output is low, whatever state the rest is in.
+pub fn off() {
+    set_mode(Ocm::FORCE_INACTIVE);
+    TIM3.dier().modify(|w| w.set_ccie(OUT, false));
+}
+
+fn set_mode(mode: Ocm) {
+    TIM3.ccmr_output(OUT / 2)
+        .modify(|w| w.set_ocm(OUT % 2, mode));
+}
+
+/// Flags are cleared by writing 0; 1 leaves the others alone.
+fn clear(channel: usize) {
+    TIM3.sr().write_value(SrGp16(!(2 << channel)));
+}
+
+/// A match on the output's channel.
+fn on_match() {
+    critical_section::with(|cs| {
+        let mut pulse = PULSE.borrow_ref_mut(cs);
+        *pulse = match *pulse {
+            Pulse::Rising { ends_us } | Pulse::High { ends_us } => go_on(ends_us),
+            Pulse::Falling | Pulse::None => {
+                TIM3.dier().modify(|w| w.set_ccie(OUT, false));
+                Pulse::None
+            }
+        };
+    });
+}
+
+/// The output is high: tells the timer when it falls, or when to be told.
+fn go_on(ends_us: u64) -> Pulse {
+    let left_us = ends_us.saturating_sub(now_us());
+    if left_us > LONGEST_US {
+        set_mode(Ocm::FORCE_ACTIVE);
+        let next_us = ends_us - left_us + PART_US;
+        TIM3.ccr(OUT).write(|w| w.set_ccr(next_us as u16));
+        return Pulse::High { ends_us };
+    }
+    TIM3.ccr(OUT).write(|w| w.set_ccr(ends_us as u16));
+    set_mode(Ocm::INACTIVE_ON_MATCH);
+    if now_us() >= ends_us && !TIM3.sr().read().ccif(OUT) {
+        // Shorter than this interrupt took.
+        off();
+        return Pulse::None;
+    }
+    Pulse::Falling
+}
+
+#[embassy_stm32::interrupt]
+fn TIM3() {
+    let flags = TIM3.sr().read();
+    if flags.ccif(OUT) {
+        clear(OUT);
+        on_match();
+    }
+    if flags.ccif(IN) {
+        // Reading it clears its flag.
+        let captured = TIM3.ccr(IN).read().ccr();
+        let now = now_us();
+        let since = (now as u16).wrapping_sub(captured);
+        // Nobody waits for more edges than a train has.
+        let _ = EDGES.try_send(now - u64::from(since));
+    }
+    if flags.ccif(0) {
+        clear(0);
+        time::on_alarm();
+    }
+}

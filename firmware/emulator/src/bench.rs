@@ -1,0 +1,375 @@
+//! Pins and wires: what the chip's outputs do to the world, and the world to its inputs.
+
+use std::sync::mpsc::{Receiver, Sender};
+
+use rigless::device::Level;
+use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
+use rigless::mcu::Operate;
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
+use rigless::soc::stm32f427::peripherals::tim::Channel;
+use rigless::time::VirtualNanos;
+
+use crate::chips::{Shared, lock};
+use crate::part::{Bench, FLASH, FLASH_LEN, SECTORS};
+
+/// What the script asks of the chip's side while the clock stands.
+#[derive(Debug)]
+pub enum Command {
+    /// Lets the time pass until then, ns.
+    Run(u64),
+    /// Stops the processor, or lets it go on; the rest of the chip is not asked.
+    HoldCore(bool),
+    /// The processor's next access here ends in a bus fault.
+    Fail(u64),
+    /// A register.
+    Peek(u64),
+    /// The other arm raises the trigger wire, or lets it go.
+    TriggerIn(bool),
+    /// The reset pin goes low and comes back.
+    Reset,
+    /// The run is over.
+    End,
+}
+
+/// An output of the chip, and whether its pin is given to it.
+#[derive(Clone, Copy, Debug)]
+enum Output {
+    /// Port, pin.
+    Plain(usize, u8),
+    /// Port, pin, alternate function, general-purpose timer (TIM2 … TIM5 as 0 … 3), channel.
+    Timer(usize, u8, u8, usize, u8),
+    /// The same for TIM8.
+    Tim8(usize, u8, u8, u8),
+}
+
+const STEPS: [Output; 2] = [
+    Output::Timer(A, 0, 2, TIM5, 1),
+    Output::Timer(B, 10, 1, TIM2, 3),
+];
+const DIRECTIONS: [Output; 2] = [Output::Plain(A, 9), Output::Plain(B, 4)];
+const ENABLE: Output = Output::Plain(C, 3);
+const RELAY: Output = Output::Tim8(C, 6, 3, 1);
+const TRIGGER: Output = Output::Timer(B, 5, 2, TIM3, 2);
+/// Inputs: port, pin.
+const HOME: [(usize, u8); 2] = [(C, 0), (C, 1)];
+const CHAIN: (usize, u8) = (C, 2);
+const TRIGGER_IN: (usize, u8) = (C, 8);
+
+const A: usize = 0;
+const B: usize = 1;
+const C: usize = 2;
+const TIM2: usize = 0;
+const TIM3: usize = 1;
+const TIM4: usize = 2;
+const TIM5: usize = 3;
+/// TIM8 among the advanced timers.
+const TIM8: usize = 1;
+
+/// Which internal trigger of a timer is which (RM0390, tables of TIMx_SMCR): TIM8 gates TIM2 and TIM5,
+/// TIM3 clocks TIM4.
+const ITR_TIM8_OF_TIM2: u8 = 1;
+const ITR_TIM8_OF_TIM5: u8 = 3;
+const ITR_TIM3_OF_TIM4: u8 = 2;
+
+const GPIO: core::ops::Range<u64> = 0x4002_0000..0x4002_2C00;
+const TIMERS: core::ops::Range<u64> = 0x4000_0000..0x4000_1000;
+const ADVANCED_TIMERS: core::ops::Range<u64> = 0x4001_0000..0x4001_0800;
+const SPI_CR1: [u64; 2] = [0x4001_3000, 0x4000_3800];
+const FLASH_CR: u64 = 0x4002_3C10;
+const FLASH_SR: u64 = 0x4002_3C0C;
+const STRT: u64 = 1 << 16;
+const SER: u64 = 1 << 1;
+const BSY: u32 = 1 << 16;
+
+/// The chip's side of the run.
+pub struct Wiring {
+    /// What it is wired to.
+    pub world: Shared,
+    /// From the script.
+    pub commands: Receiver<Command>,
+    /// To the script: the clock stands, with the value that was asked for.
+    pub done: Sender<u32>,
+    state: State,
+}
+
+/// Levels as they were last seen or driven.
+#[derive(Debug, Default)]
+struct State {
+    steps: [bool; 2],
+    trigger: bool,
+    gate: Option<Level>,
+    time_pulses: u64,
+    inputs: [Option<Level>; 3],
+    resets: usize,
+    is_erasing: bool,
+    core_is_held: bool,
+}
+
+impl Wiring {
+    /// Wires a chip up.
+    pub fn new(world: Shared, commands: Receiver<Command>, done: Sender<u32>) -> Self {
+        Self {
+            world,
+            commands,
+            done,
+            state: State::default(),
+        }
+    }
+
+    /// After anything that may have changed an output.
+    fn look(&mut self, chip: &mut Stm32f427, at: VirtualNanos) {
+        self.link_timers(chip, at);
+        let mut world = lock(&self.world);
+        world.now_ns = at.0;
+        let enabled = level(chip, ENABLE);
+        for i in 0..2 {
+            let up = level(chip, DIRECTIONS[i]);
+            let axis = &mut world.axes[i];
+            axis.is_enabled = enabled;
+            if up != axis.up {
+                axis.up = up;
+                axis.turned_ns = at.0;
+            }
+            let step = level(chip, STEPS[i]);
+            if step && !self.state.steps[i] {
+                axis.step(at.0);
+            }
+            self.state.steps[i] = step;
+        }
+        let trigger = level(chip, TRIGGER);
+        if trigger != self.state.trigger {
+            world.trigger.push((at.0, trigger));
+            self.state.trigger = trigger;
+        }
+        world.relay.energise(level(chip, RELAY), at.0);
+        let now_us = at.0 / 1000;
+        let switches = [0, 1].map(|i| world.axes[i].plant.switch_closed(now_us));
+        let closed = world.chain_is_closed();
+        drop(world);
+        let inputs = [
+            (HOME[0], switches[0]),
+            (HOME[1], switches[1]),
+            (CHAIN, closed),
+        ];
+        for (known, ((port, pin), closed)) in self.state.inputs.iter_mut().zip(inputs) {
+            // A closed contact leads to ground; an open one leaves the pin to its pull-up.
+            let drives = closed.then_some(Level::Low);
+            if *known != Some(Level::from(!closed)) {
+                *known = Some(Level::from(!closed));
+                drive(chip, at, port, pin, drives);
+            }
+        }
+    }
+
+    /// Triggers from timer to timer, which the chip wires inside.
+    fn link_timers(&mut self, chip: &mut Stm32f427, at: VirtualNanos) {
+        let (gate, _) = chip.advanced_timer(TIM8).0.trigger_output();
+        if self.state.gate != Some(gate) {
+            self.state.gate = Some(gate);
+            for (timer, itr) in [(TIM2, ITR_TIM8_OF_TIM2), (TIM5, ITR_TIM8_OF_TIM5)] {
+                chip.drive_timer(at, timer, |tim, registers, context| {
+                    tim.drive_internal_trigger(itr, gate, registers, context);
+                });
+            }
+        }
+        let (_, pulses) = chip.timer(TIM3).0.trigger_output();
+        let new = pulses.saturating_sub(self.state.time_pulses);
+        self.state.time_pulses = pulses;
+        for _ in 0..new {
+            for edge in [Level::High, Level::Low] {
+                chip.drive_timer(at, TIM4, |tim, registers, context| {
+                    tim.drive_internal_trigger(ITR_TIM3_OF_TIM4, edge, registers, context);
+                });
+            }
+        }
+    }
+
+    /// A write that means something outside the chip.
+    fn take_write(&mut self, session: &mut Session<Bench>, host: &mut dyn Host, access: &Access) {
+        let chip = &mut session.board_mut().chip;
+        if let Some(axis) = SPI_CR1.iter().position(|&cr1| cr1 == access.address) {
+            let divider = 2u64 << (access.value >> 3 & 7);
+            let bus = if axis == 0 { pclk2(chip) } else { pclk1(chip) };
+            lock(&self.world).axes[axis].ssi_hz = bus as f64 / divider as f64;
+        }
+        if access.address == FLASH_CR && access.value & STRT != 0 && access.value & SER != 0 {
+            erase(host, (access.value >> 3 & 0xF) as usize);
+            lock(&self.world).erases += 1;
+            // The processor fetches from the flash that is being erased: it waits.
+            self.state.is_erasing = true;
+            host.hold(true);
+        }
+        if (FLASH..FLASH + FLASH_LEN).contains(&access.address) {
+            program(host, access);
+        }
+    }
+
+    fn after_stop(&mut self, session: &mut Session<Bench>, host: &mut dyn Host, at: VirtualNanos) {
+        let resets = session.resets().len();
+        if resets != self.state.resets {
+            for reset in &session.resets()[self.state.resets..] {
+                let cause = format!("{:?}", reset.cause);
+                lock(&self.world).resets.push((reset.at.0, cause));
+            }
+            self.state = State {
+                resets,
+                core_is_held: self.state.core_is_held,
+                ..State::default()
+            };
+        }
+        let chip = &mut session.board_mut().chip;
+        if self.state.is_erasing && peek(chip, at, FLASH_SR) & BSY == 0 {
+            self.state.is_erasing = false;
+            host.hold(self.state.core_is_held);
+        }
+    }
+}
+
+impl Driver<Bench> for Wiring {
+    fn on_settled(&mut self, session: &mut Session<Bench>, host: &mut dyn Host, settled: Settled) {
+        match settled {
+            Settled::Access { access, .. } => {
+                if access.kind == AccessKind::Write {
+                    self.take_write(session, host, &access);
+                }
+                let ranges = [GPIO, TIMERS, ADVANCED_TIMERS];
+                if access.kind == AccessKind::Write
+                    && ranges.iter().any(|range| range.contains(&access.address))
+                {
+                    self.look(&mut session.board_mut().chip, access.virtual_time);
+                }
+            }
+            Settled::Stop(stop) => {
+                self.after_stop(session, host, stop.at);
+                self.look(&mut session.board_mut().chip, stop.at);
+            }
+            _ => {}
+        }
+    }
+
+    fn on_stop(
+        &mut self,
+        session: &mut Session<Bench>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        let mut answer = 0;
+        loop {
+            // The script has gone: so does the run.
+            self.done.send(answer).ok()?;
+            answer = 0;
+            match self.commands.recv().ok()? {
+                Command::Run(until) => return Some(VirtualNanos(until.max(stop.at.0 + 1))),
+                Command::HoldCore(held) => {
+                    self.state.core_is_held = held;
+                    host.hold(held);
+                }
+                Command::Fail(address) => session.fail_next(address, address + 4),
+                Command::Peek(address) => {
+                    answer = peek(&mut session.board_mut().chip, stop.at, address);
+                }
+                Command::TriggerIn(high) => {
+                    let chip = &mut session.board_mut().chip;
+                    let (port, pin) = TRIGGER_IN;
+                    drive(chip, stop.at, port, pin, Some(Level::from(high)));
+                    if let Some(channel) = Channel::new(3) {
+                        chip.drive_timer(stop.at, TIM3, |tim, registers, context| {
+                            tim.drive_input(channel, Level::from(high), registers, context);
+                        });
+                    }
+                }
+                Command::Reset => {
+                    session.reset_by_pin(stop.at, stop.instruction_count, host);
+                }
+                Command::End => return None,
+            }
+        }
+    }
+}
+
+/// Whether an output is high. One whose pin is not given to it floats, and a pull-down holds it low.
+fn level(chip: &mut Stm32f427, output: Output) -> bool {
+    let high = |level: Option<Level>| level == Some(Level::High);
+    match output {
+        Output::Plain(port, number) => {
+            let (gpio, registers) = chip.port(port);
+            Pin::new(number).is_some_and(|pin| high(Some(gpio.level(pin, registers))))
+        }
+        Output::Timer(port, number, function, timer, channel) => {
+            let (_, registers) = chip.port(port);
+            let given = Pin::new(number).and_then(|pin| Gpio::function(pin, registers));
+            let (tim, registers) = chip.timer(timer);
+            let output = Channel::new(channel).and_then(|channel| tim.output(channel, registers));
+            given == Some(function) && high(output)
+        }
+        Output::Tim8(port, number, function, channel) => {
+            let (_, registers) = chip.port(port);
+            let given = Pin::new(number).and_then(|pin| Gpio::function(pin, registers));
+            let (tim, registers) = chip.advanced_timer(TIM8);
+            let output = Channel::new(channel).and_then(|channel| tim.output(channel, registers));
+            given == Some(function) && high(output)
+        }
+    }
+}
+
+fn drive(chip: &mut Stm32f427, at: VirtualNanos, port: usize, pin: u8, level: Option<Level>) {
+    let Some(pin) = Pin::new(pin) else { return };
+    chip.drive_port(at, port, |gpio, registers, context| {
+        gpio.drive(pin, level, registers, context);
+    });
+}
+
+fn peek(chip: &mut Stm32f427, at: VirtualNanos, address: u64) -> u32 {
+    let value = Operate::peek(chip, at, address, Width::W32);
+    value.unwrap_or_default() as u32
+}
+
+/// Clock of the AHB by the clock tree's registers (RM0390, 6.3.2 and 6.3.3), Hz.
+fn hclk(chip: &mut Stm32f427) -> u64 {
+    let at = VirtualNanos(0);
+    let (pll, cfgr) = (peek(chip, at, 0x4002_3804), peek(chip, at, 0x4002_3808));
+    let (m, n, p) = (pll & 0x3F, pll >> 6 & 0x1FF, 2 * ((pll >> 16 & 3) + 1));
+    let system = match cfgr >> 2 & 3 {
+        0 => 16_000_000,
+        1 => 8_000_000,
+        _ => 8_000_000 / u64::from(m.max(1)) * u64::from(n) / u64::from(p),
+    };
+    let ahb = cfgr >> 4 & 0xF;
+    let shift = [0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 6, 7, 8, 9][ahb as usize];
+    system >> shift
+}
+
+fn apb_shift(field: u32) -> u32 {
+    if field & 4 == 0 { 0 } else { (field & 3) + 1 }
+}
+
+fn pclk1(chip: &mut Stm32f427) -> u64 {
+    let shift = apb_shift(peek(chip, VirtualNanos(0), 0x4002_3808) >> 10 & 7);
+    hclk(chip) >> shift
+}
+
+fn pclk2(chip: &mut Stm32f427) -> u64 {
+    let shift = apb_shift(peek(chip, VirtualNanos(0), 0x4002_3808) >> 13 & 7);
+    hclk(chip) >> shift
+}
+
+/// A sector becomes ones.
+fn erase(host: &mut dyn Host, sector: usize) {
+    let from = FLASH + SECTORS.iter().take(sector).sum::<u64>();
+    let length = SECTORS.get(sector).copied().unwrap_or(0);
+    for at in (from..from + length).step_by(4) {
+        // Whatever this image's map lacks is not erased, and shows as such when it is read.
+        let _ = host.program(at, Width::W32, u64::from(u32::MAX));
+    }
+}
+
+/// A store to flash: bits go from one to zero, never back.
+fn program(host: &mut dyn Host, access: &Access) {
+    let Ok(old) = host.read(access.address, access.width) else {
+        return;
+    };
+    let _ = host.program(access.address, access.width, old & access.value);
+}

@@ -1,0 +1,117 @@
+//! What is tried, row by row. Each starts a chip of its own.
+
+mod motion;
+mod registers;
+mod safety;
+mod settings;
+mod trigger;
+
+use std::path::Path;
+
+use anyhow::{Result, bail, ensure};
+use gonia_protocol::message::{ControllerState, ResetReason};
+
+use crate::chips::lock;
+use crate::rig::Rig;
+
+/// A row: what it is called, what it does, whether it is among the essential ones.
+pub struct Row {
+    /// What it is called.
+    pub name: &'static str,
+    /// Runs it: a figure to print, or why it failed.
+    pub run: fn(&Path) -> Result<Outcome>,
+    /// Part of every test run; the others only with `--all`.
+    pub is_essential: bool,
+}
+
+/// What a row has measured.
+pub struct Outcome {
+    /// In words.
+    pub figure: String,
+    /// Virtual time that passed, µs.
+    pub virtual_us: u64,
+}
+
+/// Every row.
+pub const ROWS: &[Row] = &[
+    row("boot and hello", true, boot),
+    row(
+        "registers by the manual",
+        true,
+        registers::as_the_manual_says,
+    ),
+    row("homing, 3 poses, trigger pulses", true, motion::three_poses),
+    row(
+        "processor stopped in mid-move",
+        true,
+        safety::processor_stops,
+    ),
+    row("hard fault in mid-move", true, safety::hard_fault),
+    row("reset in mid-move", true, safety::reset_in_mid_move),
+    row("emergency stop and clear", true, safety::emergency_stop),
+    row("settings saved, read after reset", true, settings::saved),
+    row("settings that nothing can do", true, settings::refused),
+    row(
+        "power lost in an erase",
+        false,
+        settings::power_lost_in_an_erase,
+    ),
+    row("chain cut in mid-move", false, safety::chain_cut),
+    row("encoder lost in mid-move", false, motion::encoder_lost),
+    row("motor stalls in mid-move", false, motion::stall),
+    row("motor stalls in a stop", false, motion::stall_in_a_stop),
+    row("host gone in mid-move", false, motion::host_gone),
+    row("homing and 50 poses", false, motion::fifty_poses),
+];
+
+const fn row(name: &'static str, is_essential: bool, run: fn(&Path) -> Result<Outcome>) -> Row {
+    Row {
+        name,
+        run,
+        is_essential,
+    }
+}
+
+/// A chip that has started.
+fn started(elf: &Path) -> Result<Rig> {
+    let mut rig = Rig::power_on(elf)?;
+    rig.run_us(100_000)?;
+    rig.hello(7)?;
+    Ok(rig)
+}
+
+fn done(rig: Rig, figure: String) -> Result<Outcome> {
+    let virtual_us = rig.now_us();
+    let gaps = rig.end()?;
+    // What the emulator could not stand in for, apart from the F446's own register of clocks.
+    let strange: Vec<String> = gaps.into_iter().filter(|gap| !is_known(gap)).collect();
+    if !strange.is_empty() {
+        bail!("the emulator cannot stand in for: {}", strange.join("; "));
+    }
+    Ok(Outcome { figure, virtual_us })
+}
+
+/// Gaps that say nothing about this image: RCC_DCKCFGR2 is the F446's alone, and flash is programmed by
+/// the bench.
+fn is_known(gap: &str) -> bool {
+    gap.contains("0x40023894") || gap.contains("at=0x0800") || gap.contains("DCKCFGR")
+}
+
+fn boot(elf: &Path) -> Result<Outcome> {
+    let mut rig = Rig::power_on(elf)?;
+    rig.run_us(100_000)?;
+    let identity = rig.hello(7)?;
+    ensure!(
+        identity.reset == ResetReason::PowerOn,
+        "it says {:?}",
+        identity.reset
+    );
+    let state = rig.status()?.state;
+    ensure!(
+        state == ControllerState::Unhomed,
+        "it is in {state:?} after the start"
+    );
+    let byte_ns = lock(&rig.world).wire.byte_ns.unwrap_or(0);
+    let baud = 1e10 / byte_ns.max(1) as f64;
+    done(rig, format!("{}, {baud:.0} baud", identity.board))
+}

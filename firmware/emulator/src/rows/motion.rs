@@ -1,0 +1,144 @@
+//! Homing, poses, and what goes wrong on the way.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use gonia_protocol::fault::FaultCode;
+use gonia_protocol::message::{ControllerState, Message, Move, RequestOutcome};
+
+use super::{Outcome, done, started, trigger};
+use crate::chips::lock;
+use crate::reference::Reference;
+use crate::rig::Rig;
+
+/// The pointing limit, degrees.
+const POINTING_DEG: f64 = 0.03;
+const MOVE_US: u64 = 60_000_000;
+
+pub fn three_poses(elf: &Path) -> Result<Outcome> {
+    let (mut rig, poses) = poses(elf, 3)?;
+    let train = trigger::train(&mut rig)?;
+    let followed = trigger::follows(&mut rig)?;
+    done(rig, format!("{poses}; {train}; {followed}"))
+}
+
+pub fn fifty_poses(elf: &Path) -> Result<Outcome> {
+    let (rig, poses) = poses(elf, 50)?;
+    done(rig, poses)
+}
+
+/// How far chip and simulator may be apart, steps: homing looks at its switch every 2 ms, in which the slow
+/// approach makes 0.4 steps, and the two do not look at the same time.
+const APART: i64 = 1;
+
+/// Poses all over a part of the travel, the same on chip and simulator.
+fn poses(elf: &Path, count: i32) -> Result<(Rig, String)> {
+    let (mut rig, mut reference) = (started(elf)?, Reference::new());
+    rig.complete(&Message::Home, MOVE_US)?;
+    let (mut worst_deg, mut apart) = (0.0f64, 0);
+    let mut compare = |rig: &Rig, steps: [i64; 2]| {
+        let world = lock(&rig.world);
+        for (axis, steps) in world.axes.iter().zip(steps) {
+            apart = apart.max((axis.given - steps).abs());
+        }
+    };
+    let steps = reference.complete(&Message::Home)?;
+    compare(&rig, steps);
+    for i in 0..count {
+        let target = [
+            (i * 7_300_000) % 20_000_000,
+            -180_000_000 + (i * 11_100_000) % 30_000_000,
+        ];
+        let to = Message::Move(Move {
+            target_udeg: target,
+        });
+        rig.complete(&to, MOVE_US)?;
+        let steps = reference.complete(&to)?;
+        compare(&rig, steps);
+        let is = lock(&rig.world).true_deg();
+        for axis in 0..2 {
+            worst_deg = worst_deg.max((is[axis] - f64::from(target[axis]) * 1e-6).abs());
+        }
+    }
+    ensure!(worst_deg < POINTING_DEG, "an axis is {worst_deg:.4}° off");
+    ensure!(apart <= APART, "up to {apart} steps from the simulator's");
+    let (setup_us, unheard) = {
+        let world = lock(&rig.world);
+        let setup = world.axes.iter().map(|axis| axis.setup_ns).min();
+        let unheard: u64 = world.axes.iter().map(|axis| axis.unheard).sum();
+        (setup.unwrap_or(0) / 1000, unheard)
+    };
+    ensure!(
+        unheard == 0,
+        "{unheard} steps came before the drivers had current"
+    );
+    ensure!(
+        setup_us >= 5,
+        "a step came {setup_us} µs after its direction"
+    );
+    let figure = format!(
+        "{worst_deg:.4}° off at most, {apart} step from the simulator's, direction {setup_us} µs before a step"
+    );
+    Ok((rig, figure))
+}
+
+/// An arm on its way home, φ at full speed of the search (4,000 steps/s), and the request that sent it.
+pub fn under_way(elf: &Path) -> Result<(Rig, u16)> {
+    let mut rig = started(elf)?;
+    let id = rig.begin(&Message::Home)?;
+    rig.run_us(600_000)?;
+    Ok((rig, id))
+}
+
+/// The fault that a request under way ends with, and that is latched then.
+fn must_fail(mut rig: Rig, id: u16, expected: FaultCode) -> Result<Outcome> {
+    let outcome = rig.outcome(id, 10_000_000)?;
+    ensure!(
+        outcome == RequestOutcome::Failed(expected) || outcome == RequestOutcome::Stopped,
+        "it ended as {outcome:?}"
+    );
+    let state = rig.status()?.state;
+    ensure!(
+        state == ControllerState::Fault(expected),
+        "it is in {state:?}"
+    );
+    let before = lock(&rig.world).edges();
+    rig.run_us(500_000)?;
+    ensure!(lock(&rig.world).edges() == before, "steps go on");
+    done(rig, format!("{expected:?}, at rest"))
+}
+
+pub fn encoder_lost(elf: &Path) -> Result<Outcome> {
+    let (rig, id) = under_way(elf)?;
+    let until_us = rig.now_us() + 60_000_000;
+    lock(&rig.world).axes[0].plant.lose_encoder_until(until_us);
+    must_fail(rig, id, FaultCode::ENCODER_LOST)
+}
+
+pub fn stall(elf: &Path) -> Result<Outcome> {
+    let (rig, id) = under_way(elf)?;
+    let until_us = rig.now_us() + 60_000_000;
+    lock(&rig.world).axes[1].plant.stall_until(until_us);
+    must_fail(rig, id, FaultCode::FOLLOWING_ERROR)
+}
+
+/// The motor stalls while the arm slows down for a stop: the way that is left is longer than the limit.
+pub fn stall_in_a_stop(elf: &Path) -> Result<Outcome> {
+    let (mut rig, id) = under_way(elf)?;
+    rig.begin(&Message::Stop)?;
+    let until_us = rig.now_us() + 60_000_000;
+    lock(&rig.world).axes[1].plant.stall_until(until_us);
+    must_fail(rig, id, FaultCode::FOLLOWING_ERROR)
+}
+
+pub fn host_gone(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    rig.run_us(3_000_000)?;
+    let before = lock(&rig.world).edges();
+    rig.run_us(500_000)?;
+    ensure!(lock(&rig.world).edges() == before, "steps go on");
+    let state = rig.status()?.state;
+    let expected = ControllerState::Fault(FaultCode::HOST_WATCHDOG);
+    ensure!(state == expected, "it is in {state:?}");
+    done(rig, "decelerated, at rest".into())
+}

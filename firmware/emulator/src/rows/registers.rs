@@ -1,0 +1,129 @@
+//! Registers after the start, against the reference manual (RM0390) and the data sheet of the F446.
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+
+use super::{Outcome, done, started};
+use crate::chips::lock;
+
+/// What a register must hold: name, address, the bits that count, their value, why.
+type Expected = (&'static str, u64, u32, u32, &'static str);
+
+const EXPECTED: &[Expected] = &[
+    (
+        "RCC_PLLCFGR",
+        0x4002_3804,
+        0x0043_7FFF,
+        0x0040_2A04,
+        "HSE 8 MHz / 4 · 168 / 2 = 168 MHz (6.3.2)",
+    ),
+    (
+        "RCC_CFGR",
+        0x4002_3808,
+        0xFCF3 & 0xFCFF,
+        0x940A & 0xFCF3,
+        "PLL; AHB / 1, APB1 / 4, APB2 / 2 (6.3.3)",
+    ),
+    (
+        "FLASH_ACR",
+        0x4002_3C00,
+        0x70F,
+        0x705,
+        "5 wait states at 168 MHz, prefetch, caches (3.8.1)",
+    ),
+    (
+        "TIM3_PSC",
+        0x4000_0428,
+        0xFFFF,
+        83,
+        "84 MHz / 84: microseconds",
+    ),
+    (
+        "TIM4_SMCR",
+        0x4000_0808,
+        0x77,
+        0x27,
+        "counts ITR2, which is TIM3's update (table of TIM4_SMCR)",
+    ),
+    (
+        "TIM5_SMCR",
+        0x4000_0C08,
+        0x77,
+        0x35,
+        "gated by ITR3, which is TIM8 (table of TIM5_SMCR)",
+    ),
+    (
+        "TIM2_SMCR",
+        0x4000_0008,
+        0x77,
+        0x15,
+        "gated by ITR1, which is TIM8 (table of TIM2_SMCR)",
+    ),
+    ("TIM2_OR", 0x4000_0050, 0xC00, 0, "ITR1 is TIM8"),
+    (
+        "TIM8_PSC",
+        0x4001_0428,
+        0xFFFF,
+        16_799,
+        "168 MHz / 16,800: 10 kHz",
+    ),
+    ("TIM8_ARR", 0x4001_042C, 0xFFFF, 100, "10 ms"),
+    ("TIM8_CR1", 0x4001_0400, 0x9, 0x9, "one pulse, running"),
+    (
+        "TIM8_CR2",
+        0x4001_0404,
+        0x70,
+        0x10,
+        "its enable is its trigger output",
+    ),
+    ("TIM8_CCMR1", 0x4001_0418, 0x73, 0x70, "PWM 2: low at rest"),
+    (
+        "SPI1_CR1",
+        0x4001_3000,
+        0x3B,
+        0x3A & 0x3B,
+        "84 MHz / 256 = 328 kHz, clock high at rest",
+    ),
+    (
+        "SPI2_CR1",
+        0x4000_3800,
+        0x3B,
+        0x32 & 0x3B,
+        "42 MHz / 128 = 328 kHz, clock high at rest",
+    ),
+    ("IWDG_PR", 0x4000_3004, 7, 3, "/ 32: 1 kHz"),
+    ("IWDG_RLR", 0x4000_3008, 0xFFF, 100, "100 ms"),
+    (
+        "DBGMCU_APB1_FZ",
+        0xE004_2008,
+        0x100F,
+        0x100F,
+        "a debugger's halt stops TIM2 to TIM5 and the watchdog",
+    ),
+    ("DBGMCU_APB2_FZ", 0xE004_200C, 2, 2, "and TIM8"),
+];
+
+/// Fastest clock for 50 m of cable, Hz.
+const SSI_HZ: f64 = 400_000.0;
+
+pub fn as_the_manual_says(elf: &Path) -> Result<Outcome> {
+    let mut rig = started(elf)?;
+    let mut wrong = Vec::new();
+    for &(name, address, mask, expected, why) in EXPECTED {
+        let is = rig.peek(address)? & mask;
+        if is != expected {
+            wrong.push(format!("{name} is {is:#x} where {expected:#x} means {why}"));
+        }
+    }
+    ensure!(wrong.is_empty(), "{}", wrong.join("; "));
+    let hz = [0, 1].map(|i| lock(&rig.world).axes[i].ssi_hz);
+    ensure!(hz.iter().all(|&hz| hz <= SSI_HZ), "SSI at {hz:?} Hz");
+    let figure = format!(
+        "{} registers; SSI at {:.0} and {:.0} Hz",
+        EXPECTED.len(),
+        hz[0],
+        hz[1]
+    );
+    done(rig, figure)
+}

@@ -1,0 +1,168 @@
+//! What moves when the processor does not.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use gonia_protocol::message::{ControllerState, Message, RequestRefusal, ResetReason};
+
+use super::motion::under_way;
+use super::{Outcome, done};
+use crate::bench::Command;
+use crate::chips::lock;
+use crate::rig::Rig;
+
+/// Pulses end so long after the processor has stopped, ns: TIM8's 10 ms and a count of it.
+const LAST_PULSE_NS: u64 = 10_200_000;
+/// The chain is open so long after that: the relay's contact.
+const CHAIN_OPEN_US: u64 = 20_000;
+/// The watchdog's clock may be slow: 100 ms by 32 kHz are 188 ms by 17 kHz.
+const RESET_NS: u64 = 190_000_000;
+/// A register that the step timers' interrupt reads: TIM5_SR.
+const TIM5_SR: u64 = 0x4000_0C10;
+
+/// Steps after a moment, and how long after it the last one came, ns.
+fn steps_since(rig: &Rig, since_us: u64, before: [u64; 2]) -> (u64, u64) {
+    let world = lock(&rig.world);
+    let after = world.edges();
+    let last_ns = world.axes.iter().map(|axis| axis.last_ns).max();
+    let steps = (0..2).map(|i| after[i] - before[i]).sum();
+    (steps, last_ns.unwrap_or(0).saturating_sub(since_us * 1000))
+}
+
+pub fn processor_stops(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    let (at_us, before) = (rig.now_us(), lock(&rig.world).edges());
+    rig.act(Command::HoldCore(true))?;
+    rig.run_us(CHAIN_OPEN_US)?;
+    ensure!(
+        !lock(&rig.world).chain_is_closed(),
+        "the chain is still closed {} ms later",
+        CHAIN_OPEN_US / 1000
+    );
+    rig.run_us(1_000_000)?;
+    let (steps, last_ns) = steps_since(&rig, at_us, before);
+    let reset = lock(&rig.world).resets.first().cloned();
+    ensure!(
+        last_ns <= LAST_PULSE_NS,
+        "{steps} steps, the last {} ms later, and more to come; reset: {reset:?}",
+        last_ns / 1_000_000
+    );
+    let (reset_ns, cause) = reset.context("the watchdog did not restart the chip")?;
+    let reset_ns = reset_ns - at_us * 1000;
+    ensure!(
+        reset_ns <= RESET_NS,
+        "{cause} restarted the chip {} ms later",
+        reset_ns / 1_000_000
+    );
+    rig.act(Command::HoldCore(false))?;
+    let identity = rig.run_us(100_000).and_then(|()| rig.hello(8))?;
+    ensure!(
+        identity.reset == ResetReason::Watchdog,
+        "it says {:?}",
+        identity.reset
+    );
+    let figure = format!(
+        "{steps} steps, the last {:.1} ms later; reset after {} ms",
+        last_ns as f64 * 1e-6,
+        reset_ns / 1_000_000
+    );
+    done(rig, figure)
+}
+
+pub fn hard_fault(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    let (at_us, before) = (rig.now_us(), lock(&rig.world).edges());
+    rig.act(Command::Fail(TIM5_SR))?;
+    rig.run_us(1_000_000)?;
+    let (steps, last_ns) = steps_since(&rig, at_us, before);
+    ensure!(
+        last_ns < 1_000_000,
+        "{steps} steps, the last {} ms later",
+        last_ns / 1_000_000
+    );
+    let resets = lock(&rig.world).resets.clone();
+    ensure!(!resets.is_empty(), "the chip did not restart");
+    let identity = rig.hello(8)?;
+    ensure!(
+        identity.reset == ResetReason::Software && identity.last_panic.contains("hard fault"),
+        "it says {:?}, {:?}",
+        identity.reset,
+        identity.last_panic
+    );
+    let figure = format!("{steps} steps after it; reset, {:?}", identity.last_panic);
+    done(rig, figure)
+}
+
+pub fn reset_in_mid_move(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    let (at_us, before) = (rig.now_us(), lock(&rig.world).edges());
+    // In reset, and before the program has done anything.
+    rig.act(Command::HoldCore(true))?;
+    rig.act(Command::Reset)?;
+    rig.run_us(15_000)?;
+    let (steps, _) = steps_since(&rig, at_us, before);
+    {
+        let world = lock(&rig.world);
+        ensure!(steps == 0, "{steps} steps in reset");
+        ensure!(
+            !world.axes.iter().any(|axis| axis.is_enabled),
+            "the drivers have current in reset"
+        );
+        ensure!(!world.chain_is_closed(), "the chain is closed in reset");
+    }
+    rig.act(Command::HoldCore(false))?;
+    rig.run_us(100_000)?;
+    let identity = rig.hello(8)?;
+    ensure!(
+        identity.reset == ResetReason::Pin,
+        "it says {:?}",
+        identity.reset
+    );
+    let status = rig.status()?;
+    ensure!(!status.homed, "it takes itself for homed");
+    done(
+        rig,
+        "no step, no current, chain open; unhomed after it".into(),
+    )
+}
+
+pub fn emergency_stop(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    rig.begin(&Message::EStop)?;
+    let before = lock(&rig.world).edges();
+    rig.run_us(15_000)?;
+    ensure!(lock(&rig.world).edges() == before, "steps go on");
+    ensure!(!lock(&rig.world).chain_is_closed(), "the chain is closed");
+    rig.run_us(100_000)?;
+    let asked_us = rig.now_us();
+    rig.begin(&Message::ClearFault)?;
+    let took_us = rig.now_us() - asked_us;
+    ensure!(lock(&rig.world).chain_is_closed(), "the chain is open");
+    let state = rig.status()?.state;
+    ensure!(state == ControllerState::Unhomed, "it is in {state:?}");
+    done(rig, format!("chain open; cleared in {} ms", took_us / 1000))
+}
+
+pub fn chain_cut(elf: &Path) -> Result<Outcome> {
+    let (mut rig, _) = under_way(elf)?;
+    lock(&rig.world).chain_is_cut = true;
+    let at_us = rig.now_us();
+    let before = lock(&rig.world).edges();
+    rig.run_us(200_000)?;
+    let (steps, last_ns) = steps_since(&rig, at_us, before);
+    ensure!(last_ns < 4_000_000, "steps for {} ms", last_ns / 1_000_000);
+    let refusal = rig.refusal(&Message::ClearFault)?;
+    ensure!(
+        matches!(refusal, RequestRefusal::CauseRemains(_)),
+        "{refusal:?}"
+    );
+    lock(&rig.world).chain_is_cut = false;
+    rig.run_us(50_000)?;
+    rig.begin(&Message::ClearFault)?;
+    rig.complete(&Message::Home, 60_000_000)?;
+    let figure = format!(
+        "{steps} steps within {:.1} ms; homed again",
+        last_ns as f64 * 1e-6
+    );
+    done(rig, figure)
+}

@@ -1,0 +1,243 @@
+//! What the chip is wired to: motors and encoders, switches, the interlock's relay, the host's wire.
+
+use std::collections::VecDeque;
+
+use gonia_sim::plant::{AxisPlant, PlantConfig};
+
+/// How long the relay's contact takes to follow its coil, ns.
+const RELAY_NS: u64 = 8_000_000;
+/// A byte at the host's 921,600 baud, ns.
+const HOST_BYTE_NS: u64 = 10_851;
+/// How far the chip's byte may be off the host's before the host's UART misses the stop bit.
+const BYTE_TOLERANCE: f64 = 0.03;
+/// Fastest clock that the ring's SSI follows, Hz; beyond it, bits are shifted before they are there.
+const RING_HZ: f64 = 500_000.0;
+
+/// Everything beside the chip.
+#[derive(Debug)]
+pub struct World {
+    /// Virtual time, ns.
+    pub now_ns: u64,
+    /// The arm.
+    pub axes: [Axis; 2],
+    /// The wire to the host.
+    pub wire: Wire,
+    /// Edges of the trigger output: time in ns, and whether it rose.
+    pub trigger: Vec<(u64, bool)>,
+    /// The interlock's relay.
+    pub relay: Relay,
+    /// The chain is cut elsewhere: a pressed button, the other arm's relay.
+    pub chain_is_cut: bool,
+    /// Resets of the chip so far, with what asked for each.
+    pub resets: Vec<(u64, String)>,
+    /// Sectors of flash that were erased.
+    pub erases: u32,
+}
+
+/// An axis: what its driver has got, and where that took it.
+#[derive(Debug)]
+pub struct Axis {
+    /// Motor, gear, encoder, switch.
+    pub plant: AxisPlant,
+    /// The direction pin.
+    pub up: bool,
+    /// When it last changed, ns.
+    pub turned_ns: u64,
+    /// Steps given, up minus down.
+    pub given: i64,
+    /// Steps given, either way.
+    pub edges: u64,
+    /// Time of the last one, ns.
+    pub last_ns: u64,
+    /// Shortest time from a change of direction to a step, ns.
+    pub setup_ns: u64,
+    /// Shortest time between two steps, ns.
+    pub shortest_ns: u64,
+    /// The driver has current.
+    pub is_enabled: bool,
+    /// Steps that came while it had none.
+    pub unheard: u64,
+    /// Clock of its encoder's SPI, Hz.
+    pub ssi_hz: f64,
+    /// The encoder's shift register.
+    pub ssi: Ssi,
+}
+
+/// A ring's SSI: latches at the first clock after its pause.
+#[derive(Debug, Default)]
+pub struct Ssi {
+    word: u32,
+    shifted: u32,
+    last_ns: u64,
+    /// Words begun.
+    pub words: u64,
+}
+
+/// Time without a clock after which a ring latches anew, ns.
+const SSI_PAUSE_NS: u64 = 16_000;
+
+impl Axis {
+    fn new(config: PlantConfig, seed: u64) -> Self {
+        Self {
+            plant: AxisPlant::new(config, seed),
+            up: false,
+            turned_ns: 0,
+            given: 0,
+            edges: 0,
+            last_ns: 0,
+            setup_ns: u64::MAX,
+            shortest_ns: u64::MAX,
+            is_enabled: false,
+            unheard: 0,
+            ssi_hz: 0.0,
+            ssi: Ssi::default(),
+        }
+    }
+
+    /// The step input rises.
+    pub fn step(&mut self, now_ns: u64) {
+        self.setup_ns = self.setup_ns.min(now_ns - self.turned_ns);
+        if self.edges > 0 {
+            self.shortest_ns = self.shortest_ns.min(now_ns - self.last_ns);
+        }
+        self.last_ns = now_ns;
+        self.edges += 1;
+        self.given += if self.up { 1 } else { -1 };
+        if self.is_enabled {
+            self.plant.step(self.up, now_ns / 1000);
+        } else {
+            self.unheard += 1;
+        }
+    }
+
+    /// Eight clocks of the SPI, ending now: what the data line brought.
+    pub fn shift(&mut self, now_ns: u64) -> u32 {
+        let byte_ns = (8e9 / self.ssi_hz.max(1.0)) as u64;
+        let began_ns = now_ns.saturating_sub(byte_ns);
+        if began_ns > self.ssi.last_ns + SSI_PAUSE_NS || self.ssi.words == 0 {
+            let counts = self.plant.encoder_counts(began_ns / 1000);
+            // Rest bit, 18 bits of position, no error, no warning.
+            self.ssi.word = counts.map_or(0, |counts| 1 << 31 | counts << 13 | 0b11 << 11);
+            self.ssi.shifted = 0;
+            self.ssi.words += 1;
+        }
+        self.ssi.last_ns = now_ns;
+        let byte = self.ssi.word.checked_shl(8 * self.ssi.shifted).unwrap_or(0) >> 24;
+        self.ssi.shifted += 1;
+        if self.ssi_hz > RING_HZ * 1.001 {
+            // The bit on the line is the one before, here and there.
+            let skew = ((self.ssi.words * 2_654_435_761) >> 7) as u32;
+            return (byte ^ ((byte >> 1) & skew)) & 0xFF;
+        }
+        byte
+    }
+}
+
+/// The relay that closes this controller's part of the chain.
+#[derive(Debug, Default)]
+pub struct Relay {
+    coil: bool,
+    changed_ns: u64,
+}
+
+impl Relay {
+    /// The coil gets or loses its current.
+    pub fn energise(&mut self, on: bool, now_ns: u64) {
+        if on != self.coil {
+            // The contact had got there, or turns back on its way.
+            self.coil = on;
+            self.changed_ns = now_ns;
+        }
+    }
+
+    /// Whether its contact is closed.
+    pub fn is_closed(&self, now_ns: u64) -> bool {
+        let has_moved = now_ns >= self.changed_ns + RELAY_NS || self.changed_ns == 0;
+        self.coil == has_moved
+    }
+}
+
+/// Both directions of the wire to the host.
+#[derive(Debug, Default)]
+pub struct Wire {
+    to_chip: VecDeque<(u64, u8)>,
+    free_ns: u64,
+    from_chip: Vec<u8>,
+    last_ns: u64,
+    /// A byte of the chip's, ns: the shortest time between two.
+    pub byte_ns: Option<u64>,
+}
+
+impl Wire {
+    /// The host sends.
+    pub fn send(&mut self, bytes: &[u8], now_ns: u64) {
+        for &byte in bytes {
+            self.free_ns = self.free_ns.max(now_ns) + HOST_BYTE_NS;
+            self.to_chip.push_back((self.free_ns, byte));
+        }
+    }
+
+    /// What has reached the chip by now.
+    pub fn due(&mut self, now_ns: u64) -> Option<u8> {
+        let (_, byte) = self.to_chip.pop_front_if(|(due_ns, _)| *due_ns <= now_ns)?;
+        Some(byte)
+    }
+
+    /// The chip has sent a byte.
+    pub fn arrived(&mut self, byte: u8, now_ns: u64) {
+        let since = now_ns - self.last_ns;
+        self.last_ns = now_ns;
+        self.byte_ns = Some(self.byte_ns.map_or(since, |shortest| shortest.min(since)));
+        self.from_chip.push(byte);
+    }
+
+    /// What the host's UART makes of it.
+    pub fn take(&mut self) -> Vec<u8> {
+        let host = HOST_BYTE_NS as f64;
+        let is_readable = self.byte_ns.is_none_or(|ns| {
+            (ns as f64 / host - 1.0).abs() < BYTE_TOLERANCE || ns > 4 * HOST_BYTE_NS
+        });
+        let bytes = core::mem::take(&mut self.from_chip);
+        if is_readable {
+            bytes
+        } else {
+            bytes.into_iter().map(|byte| byte ^ 0x55).collect()
+        }
+    }
+}
+
+impl World {
+    /// An arm near its home switches, so that homing takes seconds, that leaves nothing to chance.
+    pub fn new() -> Self {
+        let axes = [(-5e6, 3e6), (-190e6, -170e6)];
+        let mut seed = 0;
+        Self {
+            now_ns: 0,
+            axes: axes.map(|(home, start)| {
+                seed += 1;
+                Axis::new(PlantConfig::worm_axis(home, start).quiet(), seed)
+            }),
+            wire: Wire::default(),
+            trigger: Vec::new(),
+            relay: Relay::default(),
+            chain_is_cut: false,
+            resets: Vec::new(),
+            erases: 0,
+        }
+    }
+
+    /// Whether the chain is closed.
+    pub fn chain_is_closed(&self) -> bool {
+        self.relay.is_closed(self.now_ns) && !self.chain_is_cut
+    }
+
+    /// Steps given on both axes, either way.
+    pub fn edges(&self) -> [u64; 2] {
+        [0, 1].map(|i| self.axes[i].edges)
+    }
+
+    /// The true angles, degrees.
+    pub fn true_deg(&self) -> [f64; 2] {
+        [0, 1].map(|i| self.axes[i].plant.true_udeg(self.now_ns / 1000) * 1e-6)
+    }
+}
