@@ -131,6 +131,7 @@ fn measure(folder: &Path) -> Result<[f32; 3], Box<dyn Error>> {
         rig: session.rig(),
         settings: &settings,
         keep_frames: None,
+        is_calibration: false,
         exact: false,
         orders: &Orders::default(),
         watch: &Printer,

@@ -65,6 +65,15 @@ pub fn describe(processed: &Processed) -> Vec<(String, String)> {
             ),
         ),
     ];
+    if processed.mirrors > 0 {
+        rows.push((
+            "mirror".into(),
+            format!(
+                "{} frames left out: they show the light to gonia calibrate, and are no samples",
+                table::count(processed.mirrors as u64)
+            ),
+        ));
+    }
     for refused in counts.refused {
         rows.push((
             format!("refused, {}", table::count(refused.count)),

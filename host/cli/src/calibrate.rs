@@ -6,17 +6,18 @@ use crate::{remarks, table};
 use anyhow::{Context, Result};
 use gonia_acquire::session::{RIG, now};
 use gonia_brdf::Elementary;
-use gonia_formats::{CaptureFolder, check_output, rig_toml};
+use gonia_formats::{CaptureFolder, check_output, rig_toml, write_whole_bytes};
 use gonia_pipeline::calibrate::{LightState, Number, NumberState, Spread};
 use gonia_pipeline::{Calibrated, calibrate};
+use gonia_report::files::CALIBRATION_FIGURE;
 use gonia_rig::rig_remarks;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Finds the rig's geometry from the frames of a capture folder: the camera and its arm from the fiducial
 /// lines, the light and its arm from the shading on the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia calibrate capture/                   # prints what it finds\n  gonia calibrate capture/ -o rig.toml       # and writes a rig.toml to use from now on\n\nFrames need poses of many directions; 60 of the reference are plenty. Lines are found although the\ncamera is rolled by 5 degrees, aims 40 mm aside, is 5 % nearer, or the arms' zeros are off by 2 degrees.\nWithout -o nothing is written. The rig that is written holds the numbers found and a table [calibration]\nwith their uncertainties; comments and the order of keys are not kept. A rig that was calibrated can be\ncalibrated again: its own numbers are the first guess then. The light needs frames of role 'reference'\nwhose reflectance [reference] gives, or of a reference that is smooth and reciprocal."
+    after_long_help = "Example:\n  gonia calibrate capture/                   # prints what it finds\n  gonia calibrate capture/ -o rig.toml       # and writes a rig.toml to use from now on\n\nFrames need poses of many directions; 60 of the reference are plenty. Lines are found although the\ncamera is rolled by 5 degrees, aims 40 mm aside, is 5 % nearer, or the arms' zeros are off by 2 degrees.\nWithout -o nothing is written; with it, calibration.svg beside it shows what lines and shading leave, and\ngonia report shows that picture. The rig that is written holds the numbers found and a table [calibration]\nwith their uncertainties; comments and the order of keys are not kept. A rig that was calibrated can be\ncalibrated again: its own numbers are the first guess then. The light needs frames of role 'reference'\nwhose reflectance [reference] gives, or of a reference that is smooth and reciprocal."
 )]
 pub struct Calibrate {
     /// The capture folder
@@ -45,11 +46,22 @@ impl Calibrate {
         let mut rows = describe(&calibrated);
         if let Some(output) = &self.output {
             rig_toml::write_rig(output, &calibrated.rig)?;
-            rows.push(("written".into(), output.display().to_string()));
+            let figure = output.with_file_name(CALIBRATION_FIGURE);
+            write_figure(&figure, &calibrated)?;
+            rows.push((
+                "written".into(),
+                format!("{}, {}", output.display(), figure.display()),
+            ));
         }
         table::print(&rows);
         Ok(())
     }
+}
+
+/// Draws what the calibration leaves.
+pub fn write_figure(path: &Path, calibrated: &Calibrated) -> Result<()> {
+    let drawn = gonia_report::calibration(&calibrated.residuals);
+    Ok(write_whole_bytes(path, drawn.as_bytes())?)
 }
 
 /// The numbers, a line each.
@@ -82,7 +94,7 @@ fn print_numbers(numbers: &[Number]) {
 }
 
 /// What the calibration stands on, and what it means for directions.
-fn describe(found: &Calibrated) -> Vec<(String, String)> {
+pub fn describe(found: &Calibrated) -> Vec<(String, String)> {
     let row = |name: &str, value: String| (name.to_owned(), value);
     let angles = |s: Spread| format!("{:.3} / {:.3} / {:.3} deg", s.p50, s.p95, s.max);
     let mut rows = vec![
@@ -106,6 +118,20 @@ fn describe(found: &Calibrated) -> Vec<(String, String)> {
         ),
     ];
     rows.extend(describe_light(&found.light));
+    if let Some(mirror) = &found.mirror {
+        rows.push(row(
+            "mirror",
+            format!(
+                "{} frames: the light's image {:.1} px off before, {:.2} px after (RMS); it lies {:+.1} mm above the target, tilted by {:+.2}, {:+.2} deg",
+                mirror.frames,
+                mirror.highlight_px[0],
+                mirror.highlight_px[1],
+                mirror.height_mm,
+                mirror.tilt_deg[0],
+                mirror.tilt_deg[1]
+            ),
+        ));
+    }
     let [light, view] = found.changes;
     rows.push(row(
         "light moved by",
@@ -116,7 +142,7 @@ fn describe(found: &Calibrated) -> Vec<(String, String)> {
         format!("{} (median / p95 / max)", angles(view)),
     ));
     let [light, view] = found.direction_u;
-    if let LightState::Found { .. } = found.light {
+    if let LightState::Found { .. } | LightState::FoundByMirror { .. } = found.light {
         rows.push(row("u of light", angles(light)));
     }
     rows.push(row("u of view", angles(view)));
@@ -149,6 +175,12 @@ fn describe_light(light: &LightState) -> Vec<(String, String)> {
                 ),
             ),
         ],
+        LightState::FoundByMirror { frames } => vec![row(
+            "light",
+            format!(
+                "found by its image in the mirror of {frames} frames; its beam is left as it is"
+            ),
+        )],
         LightState::NoReference { frames, needed } => vec![row(
             "light",
             format!(

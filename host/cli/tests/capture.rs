@@ -5,7 +5,7 @@ mod common;
 #[path = "common/session.rs"]
 mod session;
 
-use common::{gonia, gonia_ok, text};
+use common::{gonia, gonia_ok, refused, text};
 use gonia_acquire::session::verify;
 use session::{small_rig, write_small};
 use std::path::Path;
@@ -110,6 +110,121 @@ fn sessions_survive_two_hundred_kills() {
         "200 kills in {sessions} sessions of 60 poses, none lost and none doubled, {:.0} s",
         began.elapsed().as_secs_f64()
     );
+}
+
+/// A rig whose frames show enough for a calibration.
+fn calibrated_session(folder: &Path) -> Vec<String> {
+    let mut rig = small_rig();
+    (rig.camera.width_px, rig.camera.height_px) = (200, 200);
+    (rig.camera.focal_px, rig.camera.centre_px) = (312.5, [100.0; 2]);
+    write_small(folder, &rig, 8);
+    let at = |name: &str| text(&folder.join(name)).to_owned();
+    vec![
+        "capture".into(),
+        at("s"),
+        "--rig".into(),
+        at("rig.toml"),
+        "--plan".into(),
+        at("plan.csv"),
+        "--calibrate".into(),
+    ]
+}
+
+#[test]
+fn a_session_that_calibrates_first_goes_on_after_kills_with_the_rig_that_its_frames_show() {
+    let undisturbed = tempfile::tempdir().unwrap();
+    let arguments = calibrated_session(undisturbed.path());
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let output = gonia_ok(&arguments, "");
+    let drawn = std::fs::read(undisturbed.path().join("rig.toml")).unwrap();
+    let session = undisturbed.path().join("s");
+    let found = std::fs::read(session.join("calibration/calibrated.toml")).unwrap();
+    // The session's rig is the one found, and it is not the drawn one.
+    assert_eq!(std::fs::read(session.join("rig.toml")).unwrap(), found);
+    assert_eq!(
+        std::fs::read(session.join("calibration/rig.toml")).unwrap(),
+        drawn
+    );
+    let rig = gonia_formats::rig_toml::read_rig(&session.join("rig.toml")).unwrap();
+    assert_eq!(rig.calibration.as_ref().unwrap().frames, 60, "{output}");
+    // The simulated rig is built as a careful lab does: rolled by 0.6°.
+    let roll_deg = rig.camera.mount.roll_deg;
+    assert!((roll_deg - 0.6).abs() < 0.1, "{roll_deg}");
+    assert!(session.join("calibration.svg").is_file());
+    assert_eq!(verify(&session).unwrap().broken().count(), 0);
+    let samples = std::fs::read(session.join("samples.npy")).unwrap();
+
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = calibrated_session(folder.path());
+    let session = folder.path().join("s");
+    let start = |resume: bool| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gonia"));
+        command.args(&arguments);
+        if resume {
+            command.arg("--resume");
+        }
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    };
+    // In the calibration's frames; behind them, before the rig is found; in the session.
+    let lines = |path: &str| {
+        let text = std::fs::read_to_string(session.join(path)).unwrap_or_default();
+        text.matches(" pose ").count()
+    };
+    let moments: [&dyn Fn() -> bool; 3] = [
+        &|| lines("calibration/journal.log") > 20,
+        &|| lines("calibration/journal.log") > 59,
+        &|| lines("journal.log") > 4,
+    ];
+    for (k, is_reached) in moments.into_iter().enumerate() {
+        let mut child = start(k > 0);
+        while !is_reached() {
+            assert_eq!(child.try_wait().unwrap(), None, "{k}");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    let output = start(true).wait_with_output().unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(std::fs::read(session.join("samples.npy")).unwrap() == samples);
+}
+
+#[test]
+fn a_calibration_that_was_begun_and_another_rig_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = calibrated_session(folder.path());
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    // A folder with a calibration is no fresh one.
+    let inner = folder.path().join("s/calibration");
+    std::fs::create_dir_all(&inner).unwrap();
+    std::fs::write(inner.join("provenance.toml"), "").unwrap();
+    let said = refused(&arguments, "");
+    assert!(
+        said.contains("holds frames of a calibration already"),
+        "{said}"
+    );
+    // A session that began without one.
+    let other = tempfile::tempdir().unwrap();
+    write_small(other.path(), &small_rig(), 2);
+    let plain = [
+        "capture",
+        text(&other.path().join("s")),
+        "--rig",
+        text(&other.path().join("rig.toml")),
+        "--plan",
+        text(&other.path().join("plan.csv")),
+    ]
+    .map(str::to_owned);
+    let plain: Vec<&str> = plain.iter().map(String::as_str).collect();
+    gonia_ok(&plain, "");
+    let again = [&plain[..], &["--resume", "--calibrate"]].concat();
+    let said = refused(&again, "");
+    assert!(said.contains("began without a calibration"), "{said}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use gonia_acquire::capture::{
 };
 use gonia_acquire::session::{SessionEnd, SessionFolder, SessionWriter, verify};
 use gonia_protocol::settings::Axis;
-use gonia_rig::{Frame, FrameRow, Rig};
+use gonia_rig::{Calibration, Frame, FrameRow, Rig};
 use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan};
 use gonia_sim::rig::SimRig;
@@ -167,6 +167,7 @@ fn run_with(
         rig: &rig,
         settings: rig.session.as_ref().unwrap(),
         keep_frames: surroundings.keep_frames.then(|| folder.to_owned()),
+        is_calibration: false,
         exact: true,
         orders: surroundings.orders,
         watch: surroundings.watch,
@@ -244,6 +245,92 @@ fn poses_measured_under_a_darker_lamp_are_measured_again_when_it_is_back() {
         "{text}"
     );
     assert_eq!(verify(folder.path()).unwrap().broken().count(), 0);
+}
+
+#[test]
+fn a_target_that_lies_turned_ends_a_session_at_its_first_pose_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = small_rig();
+    rig.session.as_mut().unwrap().reference = false;
+    (rig.target.mark_mm, rig.target.mark_radius_mm) = (Some([60.0, 372.0]), Some(30.0));
+    let orders = Orders::default();
+    let session = |writer, at: [f64; 2]| {
+        let calm = Surroundings::calm(&orders);
+        run_with(
+            folder.path(),
+            writer,
+            FaultPlan::default(),
+            &calm,
+            |rig, sim| {
+                let mut there = rig.clone();
+                there.target.mark_mm = Some(at);
+                Box::new(RenderingCamera::new(&there, sim, 1, POSES, true))
+            },
+        )
+    };
+    let writer = begin(folder.path(), &rig, POSES);
+    let ended = session(writer, [-372.0, 60.0]);
+    assert_eq!(ended.end, SessionEnd::Failed, "{}", ended.reason);
+    assert!(
+        ended.reason.contains("turned by 90 degrees anticlockwise")
+            && ended.reason.contains("--resume")
+            && ended.reason.lines().count() == 1,
+        "{}",
+        ended.reason
+    );
+    // Turned back, it goes on, and no pose of the turned target was kept.
+    let (writer, before) = SessionWriter::resume(folder.path()).unwrap();
+    assert_eq!(before.done().count(), 0);
+    let ended = session(writer, [60.0, 372.0]);
+    assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
+}
+
+#[test]
+fn a_calibrated_rig_that_has_moved_is_said_at_its_control_poses() {
+    let run = |aim_mm: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rig = small_rig();
+        rig.session.as_mut().unwrap().reference = false;
+        rig.calibration = Some(Calibration {
+            names: vec!["camera.mount.aim_mm[0]".into()],
+            values: vec![0.0],
+            u: vec![0.05],
+            covariance: vec![vec![0.0025]],
+            ..Calibration::default()
+        });
+        let orders = Orders::default();
+        let calm = Surroundings::calm(&orders);
+        let writer = begin(folder.path(), &rig, POSES);
+        let ended = run_with(
+            folder.path(),
+            writer,
+            FaultPlan::default(),
+            &calm,
+            |rig, sim| {
+                let mut there = rig.clone();
+                there.camera.mount.aim_mm[0] = aim_mm;
+                Box::new(RenderingCamera::new(&there, sim, 1, POSES, true))
+            },
+        );
+        let text = journal(folder.path());
+        let said = text
+            .matches("the rig has moved since it was calibrated")
+            .count();
+        (ended, said, text)
+    };
+    let (ended, said, text) = run(0.0);
+    assert_eq!((ended.end, said), (SessionEnd::Finished, 0), "{text}");
+    // A millimetre: a tenth of a pixel. Frames are used, and each of the two controls says it.
+    let (ended, said, text) = run(1.05);
+    assert_eq!((ended.end, said), (SessionEnd::Finished, 2), "{text}");
+    assert!(
+        text.contains("0.09 pixels") || text.contains("0.08 pixels"),
+        "{text}"
+    );
+    // Two centimetres: no frame is used, and the first one says why.
+    let (_, said, text) = run(20.0);
+    assert_eq!(said, 1, "{text}");
+    assert!(text.contains("pixels to the right"), "{text}");
 }
 
 /// Ends the session as `kill -9` does, as far as its folder can tell: without the last line.

@@ -120,6 +120,7 @@ fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camer
         rig,
         settings,
         keep_frames: None,
+        is_calibration: false,
         exact: false,
         orders: &orders,
         watch: &Nobody,

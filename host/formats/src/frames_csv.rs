@@ -146,14 +146,13 @@ fn parse_frame(table: &mut NamedRows<'_>, column: usize) -> Result<u32, FileErro
 
 fn parse_role(table: &NamedRows<'_>, column: usize) -> Result<Role, FileError> {
     let word = table.text(column);
-    let roles = [Role::Material, Role::Reference];
-    let role = roles
+    let role = Role::ALL
         .into_iter()
         .find(|role| word.eq_ignore_ascii_case(role.name()));
     role.ok_or_else(|| {
         table.wrong(
             format_args!("role \"{word}\" is unknown"),
-            "write material or reference",
+            "write material, reference or mirror",
         )
     })
 }

@@ -6,12 +6,14 @@
 //! | [`hdr`] | brackets of raw exposures to radiance and its variance |
 //! | [`Registrar`], [`Registration`] | where the target is in a frame, and where the camera must have been |
 //! | [`LinePoint`], [`Search`] | pieces of the fiducial lines, found from near or far, for a calibration |
+//! | [`find_highlight`], [`Highlight`] | the light's image in a mirror, for a calibration |
 //! | [`find_occlusion`], [`Mask`] | what hides the target |
 //! | [`SamplingGrid`], [`PointValue`], [`LeftOut`] | the medians at the grid's points |
 //! | [`IdealLight`] | the irradiance of a point light over the target |
 //! | [`rectify`] | a frame as seen from straight above, for people |
 
 pub mod hdr;
+mod highlight;
 mod hough;
 mod ideal_light;
 mod lines;
@@ -25,10 +27,12 @@ mod register;
 mod sampling;
 mod turn;
 
+pub use highlight::{Highlight, NoHighlight, find_highlight};
 pub use ideal_light::IdealLight;
 pub use occlusion::{Mask, find_occlusion};
 pub use register::{
-    LinePoint, PoseOffset, Registrar, Registration, RegistrationFailure, RegistrationState, Search,
+    LinePoint, OffPlace, Orientation, PoseOffset, Registrar, Registration, RegistrationFailure,
+    RegistrationState, Search,
 };
 pub use sampling::{LeftOut, PointValue, SamplingGrid};
 pub use turn::Turn;

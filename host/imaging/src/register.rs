@@ -7,6 +7,7 @@
 
 mod elsewhere;
 mod line_points;
+mod mark;
 mod prior;
 
 use crate::hough::{StripLine, strongest_line};
@@ -77,7 +78,19 @@ pub struct Registration {
     pub lines_found: usize,
     /// Whether the fiducial lines carry this registration.
     pub state: RegistrationState,
+    /// How far the lines' crossings are from where the rig has them; `None` after a fall-back.
+    pub off: Option<OffPlace>,
     camera: CameraModel,
+}
+
+/// How far the crossings of the fiducial lines are from where a rig has them at the arms' reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OffPlace {
+    /// RMS distance, pixels.
+    pub px: f64,
+    /// The largest deviation of arm, roll, image shift and magnification that shows it, in standard deviations:
+    /// of what the rig's calibration leaves open, and what arms, mounts and lenses change from frame to frame.
+    pub deviations: f64,
 }
 
 /// Estimated true shaft angles minus the reading.
@@ -144,6 +157,9 @@ pub enum RegistrationFailure {
     /// The lines are where they should be once the frame is turned back.
     #[error("the frame is {0}")]
     Turned(Turn),
+    /// The lines are where they should be, and the orientation mark is beside another of them.
+    #[error("the target (or every frame) is {0}, as its orientation mark shows")]
+    TargetTurned(Turn),
     /// The lines ask for a camera too far from its arm's reading.
     #[error("the lines put the camera {offset_deg:.1} degrees from its arm's reading")]
     FarFromPose {
@@ -187,23 +203,40 @@ impl Registrar {
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
         match self.locate(frame, reading.view, &predicted) {
-            Ok((solution, _)) => self.locked(reading, solution),
-            Err(failure) => {
-                let reason = self.explain(frame, reading.view, &predicted, failure.reason);
-                Registration {
-                    pixel_from_target: predicted,
-                    residual_px: failure.scatter_px,
-                    pose_offset: PoseOffset::default(),
-                    view: self
-                        .camera
-                        .placement(reading.view, CameraShift::default())
-                        .direction(),
-                    blur_px: failure.blur_px,
-                    lines_found: failure.lines_found,
-                    state: RegistrationState::FellBack(reason),
-                    camera: self.camera.clone(),
+            Ok((solution, _)) => match self.target_turned(frame, &solution.homography) {
+                None => self.locked(reading, solution),
+                Some(turn) => {
+                    let reason = RegistrationFailure::TargetTurned(turn);
+                    self.fell_back(reading, predicted, &solution.failing(reason))
                 }
+            },
+            Err(mut failure) => {
+                failure.reason = self.explain(frame, reading.view, &predicted, failure.reason);
+                // Kept by its pose, a frame must not show a turned target either.
+                if let RegistrationFailure::LinesMissing { .. } = failure.reason
+                    && let Some(turn) = self.target_turned(frame, &predicted)
+                {
+                    failure.reason = RegistrationFailure::TargetTurned(turn);
+                }
+                self.fell_back(reading, predicted, &failure)
             }
+        }
+    }
+
+    fn fell_back(&self, reading: Pose, predicted: Homography, failure: &Failure) -> Registration {
+        Registration {
+            pixel_from_target: predicted,
+            residual_px: failure.scatter_px,
+            pose_offset: PoseOffset::default(),
+            view: self
+                .camera
+                .placement(reading.view, CameraShift::default())
+                .direction(),
+            blur_px: failure.blur_px,
+            lines_found: failure.lines_found,
+            state: RegistrationState::FellBack(failure.reason),
+            off: None,
+            camera: self.camera.clone(),
         }
     }
 
@@ -226,7 +259,9 @@ impl Registrar {
         }
         let (solution, about) = self.locate(frame, reading.view, &predicted).ok()?;
         // Lines far from their prediction were measured again about a better one.
-        covers(&about).then(|| self.locked(reading, solution))
+        let is_whole = covers(&about) && covers(&solution.homography);
+        let is_turned = || self.target_turned(frame, &solution.homography).is_some();
+        (is_whole && !is_turned()).then(|| self.locked(reading, solution))
     }
 
     /// The rows of a frame taken at a view that show the target, if it is about where the pose puts it,
@@ -237,11 +272,16 @@ impl Registrar {
 
     fn rows_about(&self, pixel_from_target: &Homography) -> Range<usize> {
         let search_px = SEARCH_WIDTHS * self.camera.size_px[0] as f64 + 4.0;
-        rows_of_strips(&self.camera, pixel_from_target, &self.target, search_px)
+        let strips = rows_of_strips(&self.camera, pixel_from_target, &self.target, search_px);
+        match self.rows_of_marks(pixel_from_target) {
+            Some(marks) => strips.start.min(marks.start)..strips.end.max(marks.end),
+            None => strips,
+        }
     }
 
     fn locked(&self, reading: Pose, solution: Solution) -> Registration {
         Registration {
+            off: Some(self.off_place(reading.view, &solution)),
             view: self
                 .camera
                 .placement(reading.view, solution.shift)
@@ -256,6 +296,31 @@ impl Registrar {
             lines_found: solution.lines_found,
             state: RegistrationState::Locked,
             camera: self.camera.clone(),
+        }
+    }
+
+    fn off_place(&self, view: Direction, solution: &Solution) -> OffPlace {
+        let predicted = self.camera.predict(view, CameraShift::default());
+        let a = self.target.line_offset_mm;
+        let squares = [[-a, -a], [a, -a], [a, a], [-a, a]].map(|corner| {
+            let (here, there) = (predicted.apply(corner), solution.homography.apply(corner));
+            (here[0] - there[0]).powi(2) + (here[1] - there[1]).powi(2)
+        });
+        let by = solution.shift;
+        let moves = [
+            by.theta,
+            by.phi * view.theta.sine(),
+            by.roll,
+            by.shift_px[0],
+            by.shift_px[1],
+            by.log_scale,
+        ];
+        let scale = self.prior_scale(&self.trust(ARM_DEG));
+        OffPlace {
+            px: (squares.iter().sum::<f64>() / 4.0).sqrt(),
+            deviations: (moves.iter().zip(scale))
+                .map(|(by, sd)| by.abs() / sd)
+                .fold(0.0, f64::max),
         }
     }
 
@@ -590,6 +655,18 @@ struct Solution {
     furthest_px: f64,
 }
 
+impl Solution {
+    /// As a failure for another reason than its lines.
+    fn failing(&self, reason: RegistrationFailure) -> Failure {
+        Failure {
+            reason,
+            scatter_px: self.scatter_px,
+            blur_px: self.blur_px,
+            lines_found: self.lines_found,
+        }
+    }
+}
+
 /// Why there is no solution, and what was seen nevertheless.
 struct Failure {
     reason: RegistrationFailure,
@@ -686,3 +763,4 @@ fn crossing(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> Option<[f64; 2]> {
 mod photographs;
 
 pub use line_points::{LinePoint, Search};
+pub use mark::Orientation;

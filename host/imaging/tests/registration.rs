@@ -5,7 +5,7 @@ use gonia_brdf::Elementary;
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
 use gonia_imaging::*;
-use gonia_rig::{CameraModel, CameraShift, Frame, Rig, Role};
+use gonia_rig::{CameraModel, CameraShift, Frame, OrientationMark, Rig, Role};
 use gonia_sim::scene::Scene;
 
 const CORNERS: [[f64; 2]; 4] = [
@@ -365,5 +365,95 @@ fn a_camera_that_is_rolled_is_said_to_be_and_by_how_much() {
             panic!("{roll_deg}, {tv}: {:?}", found.state);
         };
         assert!((said - roll_deg).abs() < 0.02, "{said} for {roll_deg}");
+    }
+}
+
+/// A rig whose target has an orientation mark, and what its camera sees of targets that lie otherwise.
+fn marked(px: usize, at_mm: [f64; 2], radius_mm: f64) -> Scene {
+    let mut scene = Scene::of_fabric(px);
+    scene.geometry.mark = Some(OrientationMark { at_mm, radius_mm });
+    scene
+}
+
+fn turned_target(scene: &Scene, of: fn([f64; 2]) -> [f64; 2]) -> Scene {
+    let mut turned = scene.clone();
+    turned.geometry.mark = scene.geometry.mark.map(|mark| OrientationMark {
+        at_mm: of(mark.at_mm),
+        ..mark
+    });
+    turned
+}
+
+#[test]
+fn a_target_that_lies_turned_is_found_out_by_its_mark() {
+    type Lie = (Option<Turn>, fn([f64; 2]) -> [f64; 2]);
+    let lies: [Lie; 4] = [
+        (None, |p| p),
+        (Some(Turn::Left), |[x, y]| [-y, x]),
+        (Some(Turn::Half), |[x, y]| [-x, -y]),
+        (Some(Turn::Right), |[x, y]| [y, -x]),
+    ];
+    let (mut locked, mut told) = (0, 0);
+    for (px, at, radius) in [
+        (240, [365.0, 120.0], 14.0),
+        (300, [-130.0, 362.0], 12.0),
+        (200, [0.0, -360.0], 18.0),
+        (240, [-365.0, -365.0], 14.0),
+    ] {
+        let straight = marked(px, at, radius);
+        let registrar = Registrar::new(&straight.geometry.to_rig());
+        for (turn, of) in lies {
+            let scene = turned_target(&straight, of);
+            let lit = [
+                (Role::Material, [30.0, 140.0]),
+                (Role::Reference, [75.0, 20.0]),
+            ];
+            for ([tv, pv], (role, light)) in VIEWS.into_iter().zip(lit.into_iter().cycle()) {
+                let pose = Pose::from_deg([light[0], light[1], tv, pv]);
+                let frame = scene.frame(role, pose, 1);
+                let found = registrar.register(&frame, pose);
+                let place = format!("{px} {at:?} {turn:?} {tv} {pv} {role:?}: {:?}", found.state);
+                match (turn, found.state) {
+                    (None, RegistrationState::Locked) => locked += 1,
+                    (Some(turn), RegistrationState::FellBack(reason)) => {
+                        assert_eq!(reason, RegistrationFailure::TargetTurned(turn), "{place}");
+                        told += 1;
+                    }
+                    // Hidden, or cut off by the frame: nothing is said of it.
+                    (Some(_), RegistrationState::Locked) => {}
+                    (None, _) => panic!("{place}"),
+                }
+                let rows = registrar.rows(pose.view);
+                let by_rows = registrar.register_rows(&frame, pose, &rows);
+                let is_locked = found.state == RegistrationState::Locked;
+                assert_eq!(by_rows.is_some(), is_locked, "{place}");
+            }
+        }
+    }
+    eprintln!("{locked} locked, {told} of {} turned ones told", 3 * locked);
+    assert_eq!(locked, 40);
+    assert!(told >= 108, "{told}");
+}
+
+#[test]
+fn a_frame_turned_by_the_camera_is_found_out_from_straight_above_by_the_mark() {
+    let scene = marked(300, [365.0, 120.0], 12.0);
+    let registrar = Registrar::new(&scene.geometry.to_rig());
+    for phi in [0.0, 90.0, 45.0] {
+        let pose = Pose::from_deg([30.0, 140.0, 0.0, phi]);
+        let frame = scene.frame(Role::Material, pose, 1);
+        let last = 299;
+        type Of = fn([i64; 2], i64) -> [i64; 2];
+        let turns: [(Turn, Of); 4] = [
+            (Turn::Half, |[x, y], l| [l - x, l - y]),
+            (Turn::Right, |[x, y], l| [y, l - x]),
+            (Turn::Left, |[x, y], l| [l - y, x]),
+            (Turn::Mirrored, |[x, y], l| [l - x, y]),
+        ];
+        for (turn, of) in turns {
+            let found = registrar.register(&moved(&frame, |p| of(p, last)), pose);
+            let expected = RegistrationFailure::TargetTurned(turn);
+            assert_eq!(found.state, RegistrationState::FellBack(expected), "{phi}");
+        }
     }
 }

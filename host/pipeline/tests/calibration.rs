@@ -10,7 +10,7 @@ use gonia_pipeline::calibrate::LightState;
 use gonia_pipeline::process::FrameSource;
 use gonia_pipeline::{CalibrateError, Calibrated, calibrate, silent};
 use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Reference, Rig, Role};
-use gonia_sim::scene::{Scene, SceneGeometry};
+use gonia_sim::scene::{MirrorPlate, Scene, SceneGeometry};
 use std::sync::Arc;
 
 /// Frames of a rig as it is, at the poses that its arms read.
@@ -29,6 +29,12 @@ impl Rendered {
             7,
         );
         scene.beam = None;
+        // No mirror lies quite in the target's plane.
+        scene.mirror = MirrorPlate {
+            height_mm: 3.0,
+            tilt_deg: [0.12, -0.08],
+            ..MirrorPlate::default()
+        };
         let mut random = Random::new(77);
         let mut off = |d: Direction| {
             let mut by = || (jitter_deg * random.normal()).to_radians();
@@ -99,10 +105,10 @@ fn random_rows(role: Role, n: usize, seed: u64) -> Vec<FrameRow> {
 }
 
 fn nominal(px: usize) -> Rig {
-    Rig {
-        reference: Some(Reference::Reflectance([0.9; 3])),
-        ..Rig::paper(px)
-    }
+    let mut rig = Rig::paper(px);
+    rig.reference = Some(Reference::Reflectance([0.9; 3]));
+    rig.target.mirror_height_mm = Some(2.9);
+    rig
 }
 
 /// A rig that is off by `much` of what a calibration allows for, in every number.
@@ -265,6 +271,191 @@ fn frames_that_cannot_tell_are_refused_in_one_line() {
         mixed.frames[i] = frame;
     }
     refused(&mixed, "do not fit one camera");
+}
+
+#[test]
+fn a_target_that_was_put_in_turned_is_named_by_calibrate_and_by_process() {
+    let mut drawn = nominal(160);
+    (drawn.target.mark_mm, drawn.target.mark_radius_mm) = (Some([-365.0, 90.0]), Some(16.0));
+    let mut truth = somewhat_off(8);
+    truth.target.mark_radius_mm = Some(16.0);
+    for (at, turn) in [
+        ([-90.0, -365.0], "turned by 90 degrees anticlockwise"),
+        ([365.0, -90.0], "turned by 180 degrees"),
+        ([90.0, 365.0], "turned by 90 degrees clockwise"),
+    ] {
+        truth.target.mark_mm = Some(at);
+        let source = Rendered::new(&truth, random_rows(Role::Reference, 20, 5), 0.0);
+        let error = calibrate(&drawn, &source, &silent).unwrap_err().to_string();
+        assert!(
+            error.contains(turn) && error.lines().count() == 1,
+            "{error}"
+        );
+    }
+    // As drawn, it is calibrated as without a mark; process names a turned one with that rig.
+    truth.target.mark_mm = drawn.target.mark_mm;
+    let rows = random_rows(Role::Reference, 20, 5);
+    let source = Rendered::new(&truth, rows.clone(), 0.0);
+    let found = calibrate(&drawn, &source, &silent).unwrap();
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+    truth.target.mark_mm = Some([90.0, 365.0]);
+    let mut rows = rows;
+    rows.extend(random_rows(Role::Material, 20, 5));
+    let source = Rendered::new(&truth, rows, 0.0);
+    let masks = gonia_pipeline::process::Masks::default();
+    let processed = gonia_pipeline::samples_of(&found.rig, &source, &masks, &silent);
+    let error = processed.map(|_| ()).unwrap_err().to_string();
+    assert!(
+        error.contains("turned by 90 degrees clockwise in") && error.contains("of the reference"),
+        "{error}"
+    );
+}
+
+/// Poses at which the light is seen in a mirror, about in its middle.
+fn mirror_rows(n: usize, seed: u64) -> Vec<FrameRow> {
+    let mut random = Random::new(seed);
+    (0..n)
+        .map(|i| {
+            let (theta, phi) = (random.between(12.0, 72.0), random.between(0.0, 360.0));
+            FrameRow {
+                frame: i as u32,
+                role: Role::Mirror,
+                pose: Pose::from_deg([theta, phi, theta, (phi + 180.0) % 360.0]),
+                file: format!("frames/mirror_{i}.exr"),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_mirror_shows_where_the_light_is_without_a_reference() {
+    let truth = crooked(240, 0.5, 11);
+    let mut rows = random_rows(Role::Material, 24, 3);
+    rows.extend(mirror_rows(16, 4));
+    let source = Rendered::new(&truth, rows, 0.005);
+    let found = run(&source, 240).unwrap();
+    let said = describe(&found, &truth);
+    eprintln!("{said}{:?} {:?}", found.mirror, found.remarks);
+    assert_eq!(
+        found.light,
+        LightState::FoundByMirror { frames: 16 },
+        "{said}"
+    );
+    let before = errors(&nominal(240), &truth)[0];
+    let light = errors(&found.rig, &truth)[0];
+    assert!(before[1] > 0.5 && light[1] < 0.04, "{before:?} {said}");
+    // The stated uncertainty is true: within twice of it.
+    assert!(light[0] < 2.0 * found.direction_u[0].p50, "{said}");
+    let mirror = found.mirror.unwrap();
+    assert!(
+        mirror.highlight_px[0] > 1.0 && mirror.highlight_px[1] < 0.3,
+        "{mirror:?}"
+    );
+    assert!((mirror.height_mm - 3.0).abs() < 1.0, "{mirror:?}");
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+}
+
+#[test]
+fn a_mirror_and_a_reference_together_are_as_good_as_the_better_of_them() {
+    let truth = crooked(240, 0.5, 12);
+    let reference = random_rows(Role::Reference, 24, 5);
+    let light_of = |rows: Vec<FrameRow>| {
+        let source = Rendered::new(&truth, rows, 0.005);
+        let found = run(&source, 240).unwrap();
+        assert!(
+            matches!(found.light, LightState::Found { .. }),
+            "{:?}",
+            found.light
+        );
+        (errors(&found.rig, &truth)[0], found.direction_u[0])
+    };
+    let (alone, u_alone) = light_of(reference.clone());
+    let (both, u_both) = light_of([reference, mirror_rows(12, 6)].concat());
+    eprintln!("alone {alone:?} {u_alone:?}, both {both:?} {u_both:?}");
+    assert!(u_both.p95 < u_alone.p95, "{u_both:?} {u_alone:?}");
+    assert!(both[1] < alone[1].max(0.02), "{both:?} {alone:?}");
+    assert!(both[0] < 2.0 * u_both.p50, "{both:?} {u_both:?}");
+}
+
+#[test]
+fn a_mirror_frame_without_one_highlight_is_refused_and_named() {
+    let truth = somewhat_off(13);
+    let mut rows = random_rows(Role::Reference, 20, 5);
+    rows.extend(mirror_rows(5, 8));
+    // Beside the mirror's direction the mirror is dark.
+    rows[22].pose.view = Direction::from_deg(40.0, 200.0);
+    rows[22].pose.light = Direction::from_deg(20.0, 100.0);
+    let source = Rendered::new(&truth, rows.clone(), 0.0);
+    let error = run(&source, 160).unwrap_err().to_string();
+    assert!(
+        error
+            .starts_with("mirror frame 2 (frames/mirror_2.exr): nothing in the mirror is brighter")
+            && error.lines().count() == 1,
+        "{error}"
+    );
+    let mut drawn = nominal(160);
+    drawn.target.mirror_height_mm = None;
+    let flush = Rendered::new(&truth, [&rows[..20], &rows[23..]].concat(), 0.0);
+    let error = calibrate(&drawn, &flush, &silent).unwrap_err().to_string();
+    assert!(
+        error.starts_with("2 frames are of a mirror") && error.contains("target.mirror_height_mm"),
+        "{error}"
+    );
+    // Two lamps.
+    rows[22].pose = rows[23].pose;
+    let mut source = Rendered::new(&truth, rows, 0.0);
+    let width = source.frames[22].width;
+    for (x, y) in [(70, 84), (71, 84), (70, 85), (71, 85)] {
+        source.frames[22].rgb[y * width + x] = [80.0; 3];
+    }
+    let error = run(&source, 160).unwrap_err().to_string();
+    assert!(
+        error.contains("mirror frame 2") && error.contains("more than one"),
+        "{error}"
+    );
+}
+
+#[test]
+fn process_leaves_frames_of_a_mirror_out_and_counts_them() {
+    let truth = nominal(160);
+    let mut rows = random_rows(Role::Material, 6, 9);
+    let masks = gonia_pipeline::process::Masks::default();
+    let samples = |rows: &[FrameRow]| {
+        let source = Rendered::new(&truth, rows.to_vec(), 0.0);
+        gonia_pipeline::samples_of(&truth, &source, &masks, &silent).unwrap()
+    };
+    let without = samples(&rows);
+    rows.extend(mirror_rows(3, 10));
+    let with = samples(&rows);
+    assert_eq!((without.mirrors, with.mirrors), (0, 3));
+    // Noise is by a frame's number: the material's frames are the same ones.
+    assert_eq!(without.samples, with.samples);
+}
+
+/// `cargo test -p gonia-pipeline --test calibration light_by -- --ignored --nocapture`: directions of a light by
+/// mirror frames alone.
+#[test]
+#[ignore = "a measurement, a minute"]
+fn light_by_number_of_mirror_frames() {
+    for n in [6, 12, 24, 48] {
+        let (mut worst, mut all) = ([0.0f64; 2], Vec::new());
+        for seed in 20..25 {
+            let truth = crooked(240, 0.5, seed);
+            let rows = [random_rows(Role::Material, 24, seed), mirror_rows(n, seed)].concat();
+            let found = run(&Rendered::new(&truth, rows, 0.01), 240).unwrap();
+            let light = errors(&found.rig, &truth)[0];
+            all.push(light[1]);
+            worst = [
+                worst[0].max(light[1]),
+                worst[1].max(found.direction_u[0].p95),
+            ];
+        }
+        all.sort_by(f64::total_cmp);
+        eprintln!(
+            "{n} mirror frames: light p95 median {:.3} worst {:.3} degrees, u p95 worst {:.3}",
+            all[2], worst[0], worst[1]
+        );
+    }
 }
 
 /// `cargo test -p gonia-pipeline --test calibration -- --ignored --nocapture`: fifty rigs, some minutes.

@@ -393,6 +393,7 @@ fn look(
             Refusal::NotTheTarget(RegistrationFailure::Rolled { .. }) => "camera rolled",
             Refusal::NotTheTarget(RegistrationFailure::Resized { .. }) => "another size",
             Refusal::NotTheTarget(RegistrationFailure::Turned(_)) => "turned or mirrored",
+            Refusal::NotTheTarget(RegistrationFailure::TargetTurned(_)) => "target turned",
             Refusal::NoReference | Refusal::Unusable => "no reference",
         };
         if !row.why.contains(&why) {
@@ -402,7 +403,7 @@ fn look(
     }
     let mask = match case.surface {
         Surface::Reference => find_occlusion(&seen.frame, &found, told.light, rig),
-        Surface::Material => None,
+        Surface::Material | Surface::Mirror => None,
     };
     let values = grid.sample(&seen.frame, &found, mask.as_ref());
     // The same places of what there is to see, without noise and defect.

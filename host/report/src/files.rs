@@ -18,3 +18,5 @@ pub const RIVALS_FIGURE: &str = "rivals";
 pub const RIG: &str = "rig.toml";
 /// The report.
 pub const REPORT: &str = "report.html";
+/// What a calibration of the rig leaves, drawn.
+pub const CALIBRATION_FIGURE: &str = "calibration.svg";

@@ -7,10 +7,12 @@
 //! |---|---|
 //! | [`report_folder`] | everything, from the files of a run ([`files`]) |
 //! | [`write_report`], [`write_figures`], [`write_sphere`] | the HTML report; the paper's figures; one picture |
+//! | [`calibration`] | what a calibration of the rig leaves of lines and shading |
 //! | [`frontier`] | the charts of `gonia chart`: error against cost and against images |
 //! | [`baselines`] | the figure of `gonia rivals`: each baseline's slice and renders |
 
 pub mod baselines;
+mod calibration;
 mod charts;
 mod explorer;
 mod figures;
@@ -27,6 +29,7 @@ mod slices;
 mod spans;
 mod subspaces;
 
+pub use calibration::calibration;
 pub use figures::{write_figures, write_sphere};
 pub use folder::{Drawn, report_folder};
 pub use html::write_report;

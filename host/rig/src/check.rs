@@ -24,7 +24,10 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     check_camera(&rig.camera)?;
     check_arm("camera.arm", &rig.camera.arm)?;
     check_lens(rig)?;
-    check_simulated(&rig.camera, rig.source.as_ref())?;
+    // What a calibration finds of a simulated rig is no lens that is to be drawn.
+    if rig.calibration.is_none() {
+        check_simulated(&rig.camera, rig.source.as_ref())?;
+    }
     check_target(&rig.target)?;
     if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
         for rho in *reflectance {
@@ -199,6 +202,9 @@ fn check_target(target: &Target) -> Result<(), RigError> {
         0.1..=1e5,
         "mm",
     )?;
+    if let Some(height) = target.mirror_height_mm {
+        within("target.mirror_height_mm", height, -100.0..=100.0, "mm")?;
+    }
     let place = &target.place;
     within("target.place.height_mm", place.height_mm, -1e3..=1e3, "mm")?;
     for tilt in place.tilt_deg {
@@ -218,7 +224,44 @@ fn check_target(target: &Target) -> Result<(), RigError> {
             remedy: "measure both from the centre of the target".into(),
         });
     }
-    Ok(())
+    check_mark(target)
+}
+
+/// Checks that an orientation mark is a disc by itself, on the desk.
+fn check_mark(target: &Target) -> Result<(), RigError> {
+    let (at, radius) = match (target.mark_mm, target.mark_radius_mm) {
+        (None, None) => return Ok(()),
+        (Some(at), Some(radius)) => (at, radius),
+        (Some(_), None) | (None, Some(_)) => {
+            let (key, other) = match target.mark_mm {
+                Some(_) => ("target.mark_radius_mm", "target.mark_mm"),
+                None => ("target.mark_mm", "target.mark_radius_mm"),
+            };
+            let problem = format!("is missing, and {other} is there");
+            return Err(RigError::new(key, problem, "give both, or neither"));
+        }
+    };
+    let offset = target.line_offset_mm;
+    within("target.mark_radius_mm", radius, 0.001..=0.25 * offset, "mm")?;
+    for along in at {
+        within("target.mark_mm", along, -3.0 * offset..=3.0 * offset, "mm")?;
+    }
+    let furthest = at[0].abs().max(at[1].abs());
+    let wrong = if furthest - radius < target.material_half_mm {
+        "lies on the sample"
+    } else if (at.iter()).any(|c| (c.abs() - offset).abs() < radius + 0.5 * target.line_width_mm) {
+        "touches a fiducial line"
+    } else {
+        return Ok(());
+    };
+    Err(RigError::new(
+        "target.mark_mm",
+        format!(
+            "a mark of {radius} mm radius at [{}, {}] {wrong}",
+            at[0], at[1]
+        ),
+        "put it on the desk beside a line, with desk all round it",
+    ))
 }
 
 fn check_sampling(
@@ -378,6 +421,48 @@ mod tests {
             Some("camera.focal_y_px")
         );
         assert_eq!(wrong(|rig| rig.camera.p1 = 3.0), Some("camera.p1"));
+    }
+
+    #[test]
+    fn a_mirror_lies_within_some_centimetres_of_the_sample() {
+        let height = |mm| wrong(|rig| rig.target.mirror_height_mm = Some(mm));
+        assert_eq!(height(-3.0), None);
+        for mm in [1000.0, f64::NAN] {
+            assert_eq!(height(mm), Some("target.mirror_height_mm"));
+        }
+    }
+
+    #[test]
+    fn an_orientation_mark_is_a_disc_on_the_desk() {
+        let mark = |at: Option<[f64; 2]>, radius: Option<f64>| {
+            wrong(|rig| (rig.target.mark_mm, rig.target.mark_radius_mm) = (at, radius))
+        };
+        assert_eq!(mark(Some([365.0, 120.0]), Some(12.0)), None);
+        // Between sample and line; in a corner, outside of both lines.
+        assert_eq!(mark(Some([0.0, 326.5]), Some(3.0)), None);
+        assert_eq!(mark(Some([-370.0, -370.0]), Some(12.0)), None);
+        assert_eq!(
+            mark(Some([365.0, 120.0]), None),
+            Some("target.mark_radius_mm")
+        );
+        assert_eq!(mark(None, Some(12.0)), Some("target.mark_mm"));
+        for at in [
+            [0.0, 0.0],
+            [310.0, 0.0],
+            [335.0, 50.0],
+            [345.0, 50.0],
+            [370.0, 330.0],
+            [2000.0, 0.0],
+            [f64::NAN, 365.0],
+        ] {
+            assert_eq!(mark(Some(at), Some(12.0)), Some("target.mark_mm"), "{at:?}");
+        }
+        for radius in [0.0, -3.0, 200.0, f64::NAN] {
+            assert_eq!(
+                mark(Some([365.0, 120.0]), Some(radius)),
+                Some("target.mark_radius_mm")
+            );
+        }
     }
 
     #[test]

@@ -9,14 +9,20 @@ pub enum Role {
     Material,
     /// The reference that frames are calibrated against.
     Reference,
+    /// A plane mirror, or black glass: its frames show where the light is, and are no samples.
+    Mirror,
 }
 
 impl Role {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Material, Self::Reference, Self::Mirror];
+
     /// Its word in `frames.csv`.
     pub fn name(self) -> &'static str {
         match self {
             Role::Material => "material",
             Role::Reference => "reference",
+            Role::Mirror => "mirror",
         }
     }
 }

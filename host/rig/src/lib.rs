@@ -52,7 +52,8 @@ pub use homography::Homography;
 pub use raw_frame::RawFrame;
 pub use remark::Remark;
 pub use rig::{
-    CameraGeometry, CameraMount, LightGeometry, Reference, ReflectanceTable, Rig, Sampling, Target,
+    CameraGeometry, CameraMount, LightGeometry, OrientationMark, Reference, ReflectanceTable, Rig,
+    Sampling, Target,
 };
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;

@@ -117,9 +117,36 @@ pub struct Target {
     pub line_width_mm: f64,
     /// Half the side of the sample, mm.
     pub material_half_mm: f64,
+    /// Middle of the orientation mark, a bright disc beside the lines that says which side is which, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mark_mm: Option<[f64; 2]>,
+    /// Radius of the orientation mark, mm; there if `mark_mm` is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mark_radius_mm: Option<f64>,
+    /// How far the surface of a mirror in the sample's place lies above the sample's, mm, where frames of one
+    /// are to show the light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mirror_height_mm: Option<f64>,
     /// Where it lies between the arms.
     #[serde(default, skip_serializing_if = "is_default")]
     pub place: TargetPlace,
+}
+
+/// The orientation mark of a target: without it, a target that is turned by a quarter looks the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrientationMark {
+    /// Its middle, mm.
+    pub at_mm: [f64; 2],
+    /// Its radius, mm.
+    pub radius_mm: f64,
+}
+
+impl Target {
+    /// Its orientation mark, if it has one.
+    pub fn mark(&self) -> Option<OrientationMark> {
+        let (at_mm, radius_mm) = (self.mark_mm?, self.mark_radius_mm?);
+        Some(OrientationMark { at_mm, radius_mm })
+    }
 }
 
 /// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
@@ -230,6 +257,9 @@ impl Rig {
                 line_offset_mm: 335.0,
                 line_width_mm: 4.0,
                 material_half_mm: 320.0,
+                mark_mm: None,
+                mark_radius_mm: None,
+                mirror_height_mm: None,
                 place: TargetPlace::default(),
             },
             reference: None,

@@ -8,6 +8,7 @@
 
 mod as_built;
 mod light;
+mod mirror;
 mod noise;
 mod occluder;
 mod of_rig;
@@ -17,6 +18,7 @@ mod target;
 
 pub use as_built::as_built;
 pub use light::Beam;
+pub use mirror::MirrorPlate;
 pub use noise::Noise;
 pub use occluder::Occluder;
 pub use sensor::RawSensor;
@@ -24,8 +26,9 @@ pub use target::Texture;
 
 use gonia_brdf::direction::{Vec3, normalize};
 use gonia_brdf::{Brdf, Direction, Pose};
-use gonia_rig::{ArmGeometry, CameraMount, Placement, TargetPlace};
+use gonia_rig::{ArmGeometry, CameraMount, OrientationMark, Placement, TargetPlace};
 use light::LightField;
+use mirror::LampImage;
 use noise::NoiseField;
 use occluder::Silhouette;
 use optics::Optics;
@@ -57,6 +60,8 @@ pub struct SceneGeometry {
     pub line_width_mm: f64,
     /// Half the side of the material's square, mm.
     pub material_half_mm: f64,
+    /// A bright disc on the desk that says which side is which.
+    pub mark: Option<OrientationMark>,
     /// Half the side of the desk, to whose edge the lines go, mm.
     pub desk_half_mm: f64,
     /// The arm that holds the light, as it was built.
@@ -85,6 +90,7 @@ impl SceneGeometry {
             line_offset_mm: 335.0,
             line_width_mm: 4.0,
             material_half_mm: 320.0,
+            mark: None,
             desk_half_mm: 400.0,
             light_arm: ArmGeometry::default(),
             camera_arm: ArmGeometry::default(),
@@ -118,6 +124,8 @@ pub enum Surface {
     Material,
     /// The reference.
     Reference,
+    /// A plane mirror of black glass.
+    Mirror,
 }
 
 /// A frame of linear radiance.
@@ -148,6 +156,8 @@ pub struct Scene {
     pub occluder: Option<Occluder>,
     /// Spatial inhomogeneity of the material; off by default.
     pub texture: Option<Texture>,
+    /// How the mirror lies, for frames of [`Surface::Mirror`].
+    pub mirror: MirrorPlate,
     /// Seed of the noise and of the texture.
     pub seed: u64,
 }
@@ -168,6 +178,7 @@ impl Scene {
             beam: Some(Beam::default()),
             occluder: Some(Occluder::default()),
             texture: None,
+            mirror: MirrorPlate::default(),
             seed,
         }
     }
@@ -202,6 +213,9 @@ struct Painter<'a> {
     optics: Optics,
     target: TargetMap,
     light: LightField,
+    /// What a mirror shows of the lamp, where there is one instead of a surface.
+    lamp: Option<LampImage>,
+    is_mirror: bool,
     camera_at_m: Vec3,
     silhouette: Option<Silhouette>,
 }
@@ -214,13 +228,19 @@ impl<'a> Painter<'a> {
         let optics = Optics::new(geometry, &camera);
         let brdf = match which {
             Surface::Material => scene.material.as_ref(),
-            Surface::Reference => scene.reference.as_ref(),
+            // Of a mirror the exposure is chosen for the lines.
+            Surface::Reference | Surface::Mirror => scene.reference.as_ref(),
         };
         let texture = match which {
             Surface::Material => scene.texture.map(|t| (t, scene.seed)),
-            Surface::Reference => None,
+            Surface::Reference | Surface::Mirror => None,
         };
+        let is_mirror = which == Surface::Mirror;
         Self {
+            lamp: is_mirror
+                .then(|| LampImage::new(&scene.mirror, &light, geometry, &optics))
+                .flatten(),
+            is_mirror,
             pose,
             brdf,
             texture,
@@ -266,6 +286,10 @@ impl<'a> Painter<'a> {
         let point_m = point_mm.map(|c| c * 1e-3);
         let (to_light, irradiance) = self.light.at(point_m);
         let mut radiance = [grey * irradiance; 3];
+        if self.is_mirror {
+            let lamp = self.lamp.as_ref().map_or(0.0, |lamp| lamp.radiance(pixel));
+            return radiance.map(|l| l + material * lamp);
+        }
         if material > 0.0 {
             let to_camera = normalize([
                 self.camera_at_m[0] - point_m[0],

@@ -20,6 +20,7 @@ impl SceneGeometry {
             line_offset_mm: rig.target.line_offset_mm,
             line_width_mm: rig.target.line_width_mm,
             material_half_mm: rig.target.material_half_mm,
+            mark: rig.target.mark(),
             light_arm: rig.light.arm,
             camera_arm: rig.camera.arm,
             camera_mount: rig.camera.mount,
@@ -40,6 +41,8 @@ impl SceneGeometry {
         rig.target.line_offset_mm = self.line_offset_mm;
         rig.target.line_width_mm = self.line_width_mm;
         rig.target.material_half_mm = self.material_half_mm;
+        rig.target.mark_mm = self.mark.map(|mark| mark.at_mm);
+        rig.target.mark_radius_mm = self.mark.map(|mark| mark.radius_mm);
         (rig.light.arm, rig.camera.arm) = (self.light_arm, self.camera_arm);
         rig.camera.mount = self.camera_mount;
         rig.target.place = self.target_place;
@@ -63,6 +66,7 @@ impl Scene {
         let surface = match role {
             Role::Material => Surface::Material,
             Role::Reference => Surface::Reference,
+            Role::Mirror => Surface::Mirror,
         };
         let rendered = self.render(surface, exposed_at, shot);
         Frame {

@@ -97,6 +97,11 @@ impl Optics {
         Some((pixel, self.focal_px / depth))
     }
 
+    /// Standard deviation of a pixel's blurred aperture, pixels.
+    pub fn sigma_px(&self) -> f64 {
+        self.sigma_px
+    }
+
     /// Width and height of a frame, pixels.
     pub fn size_px(&self) -> [f64; 2] {
         self.size_px

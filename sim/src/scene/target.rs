@@ -3,12 +3,15 @@
 use super::SceneGeometry;
 use super::noise::mix;
 use gonia_brdf::Elementary;
+use gonia_rig::OrientationMark;
 use std::f64::consts::PI;
 
-/// Albedo of the lines.
+/// Albedo of the lines and of the orientation mark.
 const LINE_ALBEDO: f64 = 0.9;
 /// Albedo of the desk.
 const DESK_ALBEDO: f64 = 0.03;
+/// Half the side of the square that has the area of a disc of radius 1: √π/2.
+const HALF_SQUARE: f64 = 0.886_226_925_452_758;
 /// Beyond this many standard deviations a blurred edge is over.
 const REACH: f64 = 4.0;
 
@@ -25,6 +28,7 @@ pub struct TargetMap {
     offset: f64,
     half_width: f64,
     material_half: f64,
+    mark: Option<OrientationMark>,
     desk_half: f64,
     /// Further than this from an edge nothing is blurred, mm.
     reach: f64,
@@ -39,6 +43,7 @@ impl TargetMap {
             offset: geometry.line_offset_mm,
             half_width: 0.5 * geometry.line_width_mm,
             material_half: geometry.material_half_mm,
+            mark: geometry.mark,
             desk_half: geometry.desk_half_mm,
         }
     }
@@ -63,7 +68,8 @@ impl TargetMap {
         let line = |axis: usize| band(at[axis].abs(), self.offset, self.half_width, sigma[axis]);
         let desk = within(self.desk_half);
         let material = within(self.material_half);
-        let lines = 1.0 - (1.0 - line(0)) * (1.0 - line(1));
+        let mark = self.mark.map_or(0.0, |mark| disc(mark, at, sigma));
+        let lines = 1.0 - (1.0 - line(0)) * (1.0 - line(1)) * (1.0 - mark);
         let rest = (desk - material).max(0.0);
         let lines = (lines * desk).min(rest);
         Some(Paint {
@@ -71,6 +77,21 @@ impl TargetMap {
             grey: (lines * LINE_ALBEDO + (rest - lines) * DESK_ALBEDO) / PI,
         })
     }
+}
+
+/// Share of a Gaussian at a point that lies within a disc (in any one unit): exact across its edge, where that is long against
+/// the Gaussian, and that of a square of the same area along it.
+pub fn disc(mark: OrientationMark, at: [f64; 2], sigma: [f64; 2]) -> f64 {
+    let from = [at[0] - mark.at_mm[0], at[1] - mark.at_mm[1]];
+    let far = from[0].hypotenuse(from[1]);
+    let out = if far > 0.0 {
+        from.map(|c| c / far)
+    } else {
+        [1.0, 0.0]
+    };
+    let across = (out[0] * sigma[0]).hypotenuse(out[1] * sigma[1]);
+    let along = (out[1] * sigma[0]).hypotenuse(out[0] * sigma[1]);
+    band(far, 0.0, mark.radius_mm, across) * band(0.0, 0.0, HALF_SQUARE * mark.radius_mm, along)
 }
 
 /// Share of a Gaussian of standard deviation `sigma` at `x` that lies within `half` of `centre`.
@@ -141,6 +162,19 @@ mod tests {
         // The lines go on to the edge of the desk.
         assert!((at(390.0, 335.0).unwrap().grey * PI - LINE_ALBEDO).abs() < 1e-3);
         assert!(at(410.0, 0.0).is_none());
+        let geometry = SceneGeometry {
+            mark: Some(OrientationMark {
+                at_mm: [365.0, 120.0],
+                radius_mm: 12.0,
+            }),
+            ..SceneGeometry::paper(400)
+        };
+        let map = TargetMap::new(&geometry, 0.5);
+        let grey = |x, y| map.paint([x, y], || [0.5, 0.5]).unwrap().grey * PI;
+        assert!((grey(365.0, 129.0) - LINE_ALBEDO).abs() < 1e-3);
+        assert!((grey(365.0, 132.0) - 0.5 * (LINE_ALBEDO + DESK_ALBEDO)).abs() < 1e-3);
+        assert!((grey(365.0, 135.0) - DESK_ALBEDO).abs() < 1e-3);
+        assert!((grey(365.0, -120.0) - DESK_ALBEDO).abs() < 1e-6);
     }
 
     #[test]

@@ -58,6 +58,7 @@ impl Camera for RenderingCamera {
         let first = match shot.role {
             Role::Reference => 0,
             Role::Material => self.planned,
+            Role::Mirror => 2 * self.planned,
         };
         let noise = (first + shot.frame as usize) as u64;
         Ok(self.scene.frame(shot.role, pose, noise))

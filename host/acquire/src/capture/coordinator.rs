@@ -248,7 +248,7 @@ impl<'a> Coordinator<'a> {
     }
 
     fn handle(&mut self, event: WorkerEvent) -> Result<(), Halt> {
-        if !matches!(event, WorkerEvent::Fetched(_)) {
+        if !matches!(event, WorkerEvent::Fetched(_) | WorkerEvent::RigMoved(_)) {
             self.in_work = self.in_work.saturating_sub(1);
         }
         match event {
@@ -266,10 +266,18 @@ impl<'a> Coordinator<'a> {
                 }
                 self.give_up(task.index, why)
             }
+            WorkerEvent::TargetTurned(task, why) => Err(Halt::Failed(format!(
+                "pose {}: {why}: turn it back and go on with --resume, or correct target.mark_mm and begin a new session",
+                task.index
+            ))),
             WorkerEvent::NotKept(task, error) => {
                 self.note(&format!("pose {}: {error}", task.index));
                 self.again(task, &error.to_string())?;
                 self.wait();
+                Ok(())
+            }
+            WorkerEvent::RigMoved(what) => {
+                self.note(&what);
                 Ok(())
             }
             WorkerEvent::Control(take) => {

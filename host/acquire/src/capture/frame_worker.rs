@@ -7,8 +7,8 @@ use crate::capture::watch::{SessionEvent, Watch};
 use crate::session::{ControlComparison, SessionWriter};
 use gonia_formats::FileError;
 use gonia_formats::frame_exr::write_frame;
-use gonia_imaging::Registration;
-use gonia_pipeline::process::{FrameSampler, Hidden, Outcome, SampledFrame};
+use gonia_imaging::{Registration, RegistrationFailure};
+use gonia_pipeline::process::{FrameSampler, Hidden, Outcome, Refusal, SampledFrame};
 use gonia_rig::{Frame, FrameRow, Role};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
@@ -66,11 +66,45 @@ pub enum WorkerEvent {
     Spoilt(Task, String),
     /// The frame does not show its target; another take may. With the reason.
     Repeat(Task, String),
+    /// Two takes show that the target lies turned; with what was found.
+    TargetTurned(Task, String),
     /// The disk did not take it.
     NotKept(Task, FileError),
     /// The control pose was taken: how it compares with the first take; `None` when its fiducial lines are
     /// not seen, or it has no point in common with the first take.
     Control(Option<ControlComparison>),
+    /// A frame shows the lines elsewhere than the calibrated rig has them, by more than its uncertainty: in
+    /// words.
+    RigMoved(String),
+}
+
+/// Lines that are so many standard deviations from where a calibrated rig has them show that it was moved.
+const MOVED: f64 = 3.0;
+
+/// That the rig was moved since it was calibrated, where a frame shows it.
+fn moved(shot: &SampledShot) -> Option<String> {
+    let what = match (shot.sampled.report.outcome, shot.registration.off) {
+        (Outcome::Locked, Some(off)) if off.deviations > MOVED => format!(
+            "the fiducial lines are {:.2} pixels from where its calibration has them, at {:.1} standard deviations of what calibration and arms leave open",
+            off.px, off.deviations
+        ),
+        (Outcome::Refused(Refusal::NotTheTarget(why)), _) if is_elsewhere(why) => why.to_string(),
+        _ => return None,
+    };
+    Some(format!(
+        "the rig has moved since it was calibrated: {what}; find what came loose, and calibrate again"
+    ))
+}
+
+/// Whether a frame shows the target, and elsewhere.
+fn is_elsewhere(why: RegistrationFailure) -> bool {
+    matches!(
+        why,
+        RegistrationFailure::Displaced { .. }
+            | RegistrationFailure::Rolled { .. }
+            | RegistrationFailure::Resized { .. }
+            | RegistrationFailure::FarFromPose { .. }
+    )
 }
 
 /// Fetches a frame for every shot.
@@ -117,6 +151,10 @@ pub struct FrameWorker<'a> {
     pub writer: &'a Mutex<SessionWriter>,
     /// Where raw frames go, if they are kept.
     pub frames: Option<PathBuf>,
+    /// Whether frames are for a calibration: they are kept whatever they show.
+    pub is_calibration: bool,
+    /// Whether the rig was calibrated: frames that contradict it are said.
+    pub is_calibrated: bool,
     /// The first take of the control pose.
     pub baseline: Option<SampledFrame>,
     /// Who watches.
@@ -126,6 +164,8 @@ pub struct FrameWorker<'a> {
 impl FrameWorker<'_> {
     /// Works until all senders of work are gone.
     pub fn work(&mut self, work: &Receiver<Work>, events: &Sender<WorkerEvent>) {
+        // Frames that are refused are many, once something has come loose.
+        let mut is_said = false;
         let mut held: Option<(Taken, Result<SampledShot, String>)> = None;
         for item in work {
             match item {
@@ -138,6 +178,17 @@ impl FrameWorker<'_> {
                     let Some((taken, shot)) = held.take() else {
                         continue;
                     };
+                    let is_control = taken.task.is_control;
+                    if let Ok(shot) = &shot
+                        && self.is_calibrated
+                        && (is_control || taken.task.tries > 0 && !is_said)
+                        && let Some(what) = moved(shot)
+                    {
+                        is_said = true;
+                        if events.send(WorkerEvent::RigMoved(what)).is_err() {
+                            return;
+                        }
+                    }
                     let task = taken.task.clone();
                     let kept = shot.and_then(|shot| unless_panics(|| self.keep(taken, &shot)));
                     let event = kept.unwrap_or_else(|why| WorkerEvent::Spoilt(task, why));
@@ -176,9 +227,15 @@ impl FrameWorker<'_> {
             return WorkerEvent::Control(comparison);
         }
         if let Outcome::Refused(refusal) = sampled.report.outcome
-            && taken.task.tries == 0
+            && !self.is_calibration
         {
-            return WorkerEvent::Repeat(taken.task, refusal.to_string());
+            if taken.task.tries == 0 {
+                return WorkerEvent::Repeat(taken.task, refusal.to_string());
+            }
+            // A whole night of it would be of no use.
+            if let Refusal::NotTheTarget(why @ RegistrationFailure::TargetTurned(_)) = refusal {
+                return WorkerEvent::TargetTurned(taken.task, why.to_string());
+            }
         }
         if let Some(folder) = &self.frames
             && let Err(error) = write_frame(&folder.join(&taken.row.file), frame)

@@ -38,7 +38,7 @@ impl Pace {
         self.done = self.planned.saturating_sub(missing);
         self.later = match role {
             Role::Reference => self.planned * self.roles.saturating_sub(1),
-            Role::Material => 0,
+            Role::Material | Role::Mirror => 0,
         };
         self.go_on(now);
     }

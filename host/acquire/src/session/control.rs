@@ -80,9 +80,7 @@ impl ControlDone {
     /// What the journal's line says behind `control`.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let (role, rest) = text.split_once(' ')?;
-        let role = [Role::Material, Role::Reference]
-            .into_iter()
-            .find(|r| r.name() == role)?;
+        let role = Role::ALL.into_iter().find(|r| r.name() == role)?;
         if let Some(rest) = rest.strip_prefix("pose ") {
             return Self::parse_words(role, rest);
         }

@@ -188,9 +188,7 @@ impl Entry {
 }
 
 fn role_of(name: &str) -> Option<Role> {
-    [Role::Material, Role::Reference]
-        .into_iter()
-        .find(|role| role.name() == name)
+    Role::ALL.into_iter().find(|role| role.name() == name)
 }
 
 fn parse_given_up(text: &str, is_left_out: bool) -> Option<GivenUp> {

@@ -18,6 +18,10 @@ use std::path::{Path, PathBuf};
 
 /// Files of a session.
 pub const RIG: &str = "rig.toml";
+/// The picture of that calibration, which `gonia report` shows.
+pub const CALIBRATION_FIGURE: &str = "calibration.svg";
+/// The folder in a session's for the frames that its rig was calibrated by: a session of its own.
+pub const CALIBRATION: &str = "calibration";
 /// The poses.
 pub const PLAN: &str = "plan.csv";
 /// What it was measured with.

@@ -30,7 +30,7 @@ mod writer;
 pub use clock::now;
 pub use control::{ControlComparison, ControlDone, Judgement};
 pub use entry::{CHANGE_THE_SAMPLE, Entry, GivenUp, PoseDone, SessionEnd};
-pub use folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
+pub use folder::{CALIBRATION, FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
 pub use provenance::{ControllerIdentity, SessionProvenance};
 pub use state::{Contradiction, RoleState, SessionState};
 pub use verify::{Finding, Verdict, verify};

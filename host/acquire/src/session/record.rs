@@ -3,9 +3,9 @@
 //! | bytes | what |
 //! |---|---|
 //! | 4 | `GFR1` |
-//! | 4, 1 | number of the frame; role: 0 material, 1 reference |
+//! | 4, 1 | number of the frame; role: place in `Role::ALL` |
 //! | 1 | 0 by its marks; 1 by its pose; 2 refused |
-//! | 1, 8, 8 | why it was not by its marks: 0 –, 1 lines missing (found), 2 wrong layout (pixels, deviations), 3 far from the pose (degrees), 4 displaced (pixels right, down), 5 turned (place in `Turn::ALL`) |
+//! | 1, 8, 8 | why it was not by its marks: 0 –, 1 lines missing (found), 2 wrong layout (pixels, deviations), 3 far from the pose (degrees), 4 displaced (pixels right, down), 5 turned (place in `Turn::ALL`), 6 rolled (degrees), 7 resized (share), 8 the target turned (likewise) |
 //! | 3 × 8 | residual, pixels; offset of the camera's θ and φ, degrees |
 //! | 6 × 8 | reading: θi, φi, θv, φv; the camera by its marks: θ, φ; radians |
 //! | 4 | number of points |
@@ -32,7 +32,8 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
     let mut out = Vec::with_capacity(120 + 21 * frame.points.len());
     out.extend(MAGIC);
     out.extend(frame.report.frame.to_le_bytes());
-    out.push(u8::from(frame.report.role == Role::Reference));
+    let place = Role::ALL.iter().position(|role| *role == frame.report.role);
+    out.push(place.unwrap_or(0) as u8);
     let (outcome, reason) = match frame.report.outcome {
         Outcome::Locked => (0, None),
         Outcome::FellBack(reason) => (1, Some(reason)),
@@ -49,10 +50,8 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
         }) => (2, misfit_px, deviation),
         Some(RegistrationFailure::FarFromPose { offset_deg }) => (3, offset_deg, 0.0),
         Some(RegistrationFailure::Displaced { shift_px: [x, y] }) => (4, x, y),
-        Some(RegistrationFailure::Turned(turn)) => {
-            let place = Turn::ALL.iter().position(|t| *t == turn);
-            (5, place.unwrap_or(0) as f64, 0.0)
-        }
+        Some(RegistrationFailure::Turned(turn)) => (5, place_of(turn), 0.0),
+        Some(RegistrationFailure::TargetTurned(turn)) => (8, place_of(turn), 0.0),
         Some(RegistrationFailure::Rolled { roll_deg }) => (6, roll_deg, 0.0),
         Some(RegistrationFailure::Resized { share }) => (7, share, 0.0),
     };
@@ -95,6 +94,11 @@ pub fn to_bytes(frame: &SampledFrame) -> Vec<u8> {
     out
 }
 
+fn place_of(turn: Turn) -> f64 {
+    let place = Turn::ALL.iter().position(|t| *t == turn);
+    place.unwrap_or(0) as f64
+}
+
 /// The frame of some bytes; `None` when they are no frame.
 pub fn from_bytes(bytes: &[u8]) -> Option<SampledFrame> {
     let (frame, rest) = split_first(bytes)?;
@@ -109,11 +113,7 @@ pub fn split_first(bytes: &[u8]) -> Option<(SampledFrame, &[u8])> {
     }
     let frame = u32::from_le_bytes(bytes.take()?);
     let [role, outcome, why] = bytes.take()?;
-    let role = match role {
-        0 => Role::Material,
-        1 => Role::Reference,
-        _ => return None,
-    };
+    let role = *Role::ALL.get(usize::from(role))?;
     let [a, b, residual_px, theta_deg, phi_deg] = bytes.numbers()?;
     let reason = match why {
         0 => None,
@@ -127,6 +127,9 @@ pub fn split_first(bytes: &[u8]) -> Option<(SampledFrame, &[u8])> {
         5 => Some(RegistrationFailure::Turned(*Turn::ALL.get(a as usize)?)),
         6 => Some(RegistrationFailure::Rolled { roll_deg: a }),
         7 => Some(RegistrationFailure::Resized { share: a }),
+        8 => Some(RegistrationFailure::TargetTurned(
+            *Turn::ALL.get(a as usize)?,
+        )),
         _ => return None,
     };
     let outcome = match (outcome, reason) {
@@ -255,6 +258,9 @@ pub(crate) mod tests {
             })),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Turned(
                 Turn::Transverse,
+            ))),
+            Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::TargetTurned(
+                Turn::Left,
             ))),
             Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::Rolled {
                 roll_deg: -0.7,

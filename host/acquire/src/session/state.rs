@@ -126,6 +126,7 @@ pub struct SessionState {
     lines: usize,
     material: RoleState,
     reference: RoleState,
+    mirror: RoleState,
     frame_bytes: u64,
     has_awaited_material: bool,
     end: Option<(SessionEnd, String)>,
@@ -141,6 +142,7 @@ impl SessionState {
             lines: 0,
             material: RoleState::default(),
             reference: RoleState::default(),
+            mirror: RoleState::default(),
             frame_bytes: 0,
             has_awaited_material: false,
             end: None,
@@ -152,6 +154,7 @@ impl SessionState {
         match role {
             Role::Material => &self.material,
             Role::Reference => &self.reference,
+            Role::Mirror => &self.mirror,
         }
     }
 
@@ -159,6 +162,7 @@ impl SessionState {
         match role {
             Role::Material => &mut self.material,
             Role::Reference => &mut self.reference,
+            Role::Mirror => &mut self.mirror,
         }
     }
 
@@ -291,8 +295,7 @@ impl SessionState {
                 }
             }
             Entry::Discard { role, since, .. } => {
-                let both = [Role::Material, Role::Reference];
-                for each in both
+                for each in Role::ALL
                     .into_iter()
                     .filter(|r| role.is_none_or(|role| role == *r))
                 {

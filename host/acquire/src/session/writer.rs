@@ -2,7 +2,9 @@
 
 use crate::session::append::{AppendLog, LogFile};
 use crate::session::entry::{Entry, PoseDone};
-use crate::session::folder::{FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder};
+use crate::session::folder::{
+    CALIBRATION, CALIBRATION_FIGURE, FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder,
+};
 use crate::session::journal::{Journal, Lines};
 use crate::session::provenance::SessionProvenance;
 use crate::session::state::{Contradiction, SessionState};
@@ -281,7 +283,7 @@ fn check_fresh(folder: &Path, beside: Option<&str>) -> Result<(), FileError> {
                 .metadata()
                 .is_ok_and(|log| log.is_file() && log.len() == 0);
         let ours = is_log
-            || [RIG, PLAN, LOCK].contains(&&*name)
+            || [RIG, PLAN, LOCK, CALIBRATION, CALIBRATION_FIGURE].contains(&&*name)
             || beside == Some(&name)
             || name.starts_with(".gonia-") && name.ends_with(".part");
         if !ours {

@@ -1,5 +1,6 @@
 //! `gonia capture`: a session on a rig, or on the simulated one.
 
+mod calibration;
 mod map;
 mod terminal;
 
@@ -32,7 +33,7 @@ use terminal::Terminal;
 /// Measures a material: every pose of the plan, its frame, its samples.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/src/guides/night.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
+    after_long_help = "Example:\n  gonia capture silk --rig rig.toml --plan plan.csv\n  gonia capture silk --rig rig.toml --resume\n  gonia capture trial --rig rig.toml --simulated --serve 127.0.0.1:8080\n  gonia capture silk --rig rig.toml --calibrate   # finds where light and camera are, first\n\nrig.toml says where the controllers and the frames are ([arms], [source]) and how the session goes\n([session]): docs/src/guides/night.md. Ctrl-C ends it at the next pose, a second one stops the arms now. After\nany end, also a power cut, --resume goes on."
 )]
 pub struct Capture {
     /// Folder of the session
@@ -63,6 +64,9 @@ pub struct Capture {
     /// Arms and camera of the simulated rig, whatever rig.toml says
     #[arg(long, conflicts_with_all = ["light", "camera_arm"])]
     simulated: bool,
+    /// Calibrate the rig first, from 60 frames over all directions, and go on with what they show
+    #[arg(long)]
+    calibrate: bool,
     /// Keep the frames too, as a capture folder
     #[arg(long)]
     keep_frames: bool,
@@ -74,6 +78,31 @@ pub struct Capture {
     serve_anywhere: bool,
 }
 
+/// A rig, with the files that it is kept in.
+struct RigFile {
+    rig: Rig,
+    text: Vec<u8>,
+    /// The file that it names, by its name.
+    beside: Option<(String, Vec<u8>)>,
+}
+
+impl RigFile {
+    fn read(path: &Path) -> Result<Self> {
+        let rig = read_rig(path)?;
+        remarks::print(&rig_remarks(path.display(), &rig));
+        Ok(Self {
+            text: std::fs::read(path).map_err(|error| FileError::reading(path, &error))?,
+            beside: beside(path, &rig)?,
+            rig,
+        })
+    }
+
+    fn beside(&self) -> Option<(&str, &[u8])> {
+        let (name, bytes) = self.beside.as_ref()?;
+        Some((name, bytes))
+    }
+}
+
 /// The session's folder, before the controllers are connected.
 enum Folder {
     Fresh(Claim),
@@ -83,23 +112,26 @@ enum Folder {
 impl Capture {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let rig = read_rig(&self.rig)?;
-        remarks::print(&rig_remarks(self.rig.display(), &rig));
-        let rig_text =
-            std::fs::read(&self.rig).map_err(|error| FileError::reading(&self.rig, &error))?;
-        let beside = beside(&self.rig, &rig)?;
-        let beside = beside.as_ref().map(|(n, b)| (n.as_str(), b.as_slice()));
-        let settings = rig.session.clone().unwrap_or_default();
+        let drawn = RigFile::read(&self.rig)?;
+        let settings = drawn.rig.session.clone().unwrap_or_default();
+        let is_calibrated = self.is_calibrated()?;
         // A port that is taken is found out before anything is begun.
         let listening = match self.serve {
             Some(address) => Some(Listening::at(address, self.serve_anywhere)?),
             None => None,
         };
-        let (folder, plan) = self.folder_and_plan(&rig, &rig_text, beside.map(|b| b.0))?;
+        let (folder, plan) = self.folder_and_plan(&drawn)?;
         let orders = Orders::default();
         let on_interrupt = orders.clone();
         ctrlc::set_handler(move || on_interrupt.interrupt())
             .context("Ctrl-C cannot be caught on this system")?;
+        let (there, used) = match is_calibrated {
+            true => (self.there(&drawn.rig), self.calibrated(&drawn, &orders)?),
+            false => (drawn.rig.clone(), drawn),
+        };
+        if let Folder::Begun(_) = folder {
+            check_same(&self.folder.join(RIG), &used.text, &self.rig)?;
+        }
 
         let ports = ArmPortNames {
             light: self.light.as_deref(),
@@ -107,7 +139,7 @@ impl Capture {
             simulated: self.simulated,
         };
         let mut equipment =
-            Equipment::open(&rig, &self.rig, ports, plan.len(), &settings, &orders)?;
+            Equipment::open(&there, &self.rig, ports, plan.len(), &settings, &orders)?;
         if let Some(warning) = equipment.arms.calibration_warning()? {
             errln!("warning: {warning}");
         }
@@ -117,8 +149,8 @@ impl Capture {
         let mut writer = match folder {
             Folder::Begun(writer) => *writer,
             Folder::Fresh(claim) => claim.begin(Beginning {
-                rig: &rig_text,
-                beside,
+                rig: &used.text,
+                beside: used.beside(),
                 plan: &plan,
                 provenance: &provenance,
             })?,
@@ -149,6 +181,7 @@ impl Capture {
             rig: session.rig(),
             settings: &settings,
             keep_frames: self.keep_frames.then(|| self.folder.clone()),
+            is_calibration: false,
             exact: equipment.exact,
             orders: &orders,
             watch: &Watchers(watchers),
@@ -163,18 +196,12 @@ impl Capture {
     }
 
     /// The session's folder, locked, and its poses: of the session in it, or of a new one.
-    fn folder_and_plan(
-        &self,
-        rig: &Rig,
-        rig_text: &[u8],
-        beside: Option<&str>,
-    ) -> Result<(Folder, Vec<Pose>)> {
+    fn folder_and_plan(&self, drawn: &RigFile) -> Result<(Folder, Vec<Pose>)> {
         if !(self.resume && SessionFolder::is_session(&self.folder)) {
-            let claim = Claim::new(&self.folder, beside)?;
-            return Ok((Folder::Fresh(claim), self.fresh_plan(rig)?));
+            let claim = Claim::new(&self.folder, drawn.beside().map(|b| b.0))?;
+            return Ok((Folder::Fresh(claim), self.fresh_plan(&drawn.rig)?));
         }
         let (writer, session) = SessionWriter::resume(&self.folder)?;
-        check_same(&self.folder.join(RIG), rig_text, &self.rig)?;
         let plan = session.plan().to_vec();
         if let Some(path) = &self.plan
             && read_plan_csv(path)? != plan

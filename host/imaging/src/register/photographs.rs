@@ -9,6 +9,9 @@ const TARGET: Target = Target {
     line_offset_mm: 335.0,
     line_width_mm: 7.0,
     material_half_mm: 280.0,
+    mark_mm: None,
+    mark_radius_mm: None,
+    mirror_height_mm: None,
     place: TargetPlace {
         height_mm: 0.0,
         tilt_deg: [0.0; 2],

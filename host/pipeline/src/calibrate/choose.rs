@@ -1,10 +1,15 @@
 //! Which frames a calibration looks at: a measurement has thousands, and a few hundred say all.
 
+use gonia_brdf::Pose;
 use gonia_brdf::direction::dot;
 use gonia_rig::{FrameRow, Role};
 
-/// Frames of the reference and of the material at most.
-const MOST: [(Role, usize); 2] = [(Role::Reference, 130), (Role::Material, 70)];
+/// Frames of the reference, of the material and of a mirror at most.
+const MOST: [(Role, usize); 3] = [
+    (Role::Reference, 130),
+    (Role::Material, 70),
+    (Role::Mirror, 60),
+];
 
 /// The frames to look at, in their order: those of the reference first, poses far from each other.
 pub fn chosen(rows: &[FrameRow]) -> Vec<FrameRow> {
@@ -12,24 +17,33 @@ pub fn chosen(rows: &[FrameRow]) -> Vec<FrameRow> {
         let some: Vec<FrameRow> = rows.iter().filter(|r| r.role == role).cloned().collect();
         (some, most)
     };
-    let [(reference, r), (material, m)] = MOST.map(of);
+    let [(reference, r), (material, m), (mirror, most)] = MOST.map(of);
     // Without a reference the material's frames are all there is.
     let m = if reference.is_empty() { r } else { m };
-    let mut both = spread(&reference, r);
-    both.extend(spread(&material, m));
-    both
+    let mut all = spread(&reference, r);
+    all.extend(spread(&material, m));
+    all.extend(spread(&mirror, most));
+    all
 }
 
 /// At most so many frames, each as far as can be from those before it (by light and view together).
 pub fn spread(rows: &[FrameRow], most: usize) -> Vec<FrameRow> {
-    if rows.len() <= most {
-        return rows.to_vec();
+    let poses: Vec<Pose> = rows.iter().map(|row| row.pose).collect();
+    let picked = spread_poses(&poses, most);
+    picked.into_iter().map(|i| rows[i].clone()).collect()
+}
+
+/// The places of at most so many poses, in their order, each as far as can be from those chosen before it (by
+/// light and view together): those that a calibration takes.
+pub fn spread_poses(poses: &[Pose], most: usize) -> Vec<usize> {
+    if poses.len() <= most {
+        return (0..poses.len()).collect();
     }
-    let places: Vec<[[f64; 3]; 2]> = rows
+    let places: Vec<[[f64; 3]; 2]> = poses
         .iter()
-        .map(|row| [row.pose.light.to_vec3(), row.pose.view.to_vec3()])
+        .map(|pose| [pose.light.to_vec3(), pose.view.to_vec3()])
         .collect();
-    let mut distance = vec![f64::INFINITY; rows.len()];
+    let mut distance = vec![f64::INFINITY; poses.len()];
     let mut next = 0;
     let mut picked = Vec::with_capacity(most);
     while picked.len() < most {
@@ -48,13 +62,12 @@ pub fn spread(rows: &[FrameRow], most: usize) -> Vec<FrameRow> {
         next = furthest.0;
     }
     picked.sort_unstable();
-    picked.into_iter().map(|i| rows[i].clone()).collect()
+    picked
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_brdf::Pose;
 
     #[test]
     fn frames_are_spread_over_poses_and_both_roles_have_their_share() {

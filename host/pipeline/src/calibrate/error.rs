@@ -2,6 +2,7 @@
 
 use crate::process::ProcessError;
 use crate::progress::Cancelled;
+use gonia_imaging::{NoHighlight, Turn};
 
 /// Why a rig cannot be calibrated. Each says in one line what was found and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +51,45 @@ pub enum CalibrateError {
         frame: u32,
         /// By how much, pixels.
         misfit_px: f64,
+    },
+    /// The orientation mark is beside another line than rig.toml has it.
+    #[error(
+        "the target is {turn} in {frames} of {of} frames that show its orientation mark{}: {}",
+        first.map(|frame| format!(" (frame {frame} the first)")).unwrap_or_default(),
+        match first {
+            None => "turn it back and take the frames again; where it lay right, correct target.mark_mm, or turn the frames as the sensor saw them",
+            Some(_) => "it was put back otherwise in between; calibrate each part by itself",
+        }
+    )]
+    TargetTurned {
+        /// How it lies.
+        turn: Turn,
+        /// Frames that show it so.
+        frames: usize,
+        /// All that show the mark.
+        of: usize,
+        /// The first of them, where others show it as it should lie.
+        first: Option<u32>,
+    },
+    /// A frame of the mirror says nothing of the light.
+    #[error(
+        "mirror frame {frame} ({file}): {why}; put the arms where the camera sees the light in the middle of the mirror, in a dark room, and take it again, or leave its row out"
+    )]
+    NoHighlight {
+        /// Its number.
+        frame: u32,
+        /// Its file.
+        file: String,
+        /// What it shows instead.
+        why: NoHighlight,
+    },
+    /// The rig does not say how high a mirror lies.
+    #[error(
+        "{frames} frames are of a mirror, and rig.toml does not say how high it lies: give target.mirror_height_mm, how far its reflecting surface lies above the sample's (0 where it is flush), to 0.2 mm"
+    )]
+    NoMirrorHeight {
+        /// Frames of a mirror.
+        frames: usize,
     },
     /// The equations have no solution.
     #[error(

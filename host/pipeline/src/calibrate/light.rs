@@ -1,10 +1,12 @@
 //! The light from the shading on the reference.
 
 use crate::calibrate::error::CalibrateError;
-use crate::calibrate::numbers::NumberState;
+use crate::calibrate::mirror::{self, MirrorLight};
+use crate::calibrate::numbers::LightSolution;
+use crate::calibrate::residuals::ShadingResidual;
 use crate::calibrate::shading::{
-    LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, OWN, ReferenceShape, ShadedFrame, Shading,
-    ln_intensity, target_unknowns, thin,
+    LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, MirrorTerm, OWN, ReferenceShape, ShadedFrame,
+    Shading, ln_intensity, target_unknowns, thin,
 };
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
@@ -35,6 +37,11 @@ pub enum LightState {
         /// Standard deviation of the light arm's θ and φ from frame to frame, degrees.
         arm_deg: [f64; 2],
     },
+    /// Its place was found by its image in a mirror alone.
+    FoundByMirror {
+        /// Frames of the mirror.
+        frames: usize,
+    },
     /// It stays as it was: too few frames of the reference show anything.
     NoReference {
         /// Those that do.
@@ -52,42 +59,68 @@ pub enum LightState {
     },
 }
 
-/// The light as found.
-pub struct LightSolution {
-    /// Values of [`LIGHT`].
-    pub shared: Vec<f64>,
-    /// Of [`CAMERA`] and [`LIGHT`] together.
-    pub covariance: DMatrix<f64>,
-    /// What became of each number.
-    pub states: Vec<NumberState>,
+/// What is known before the light is looked for.
+pub struct Known<'a> {
+    /// The covariance of [`CAMERA`]'s numbers.
+    pub camera: &'a DMatrix<f64>,
+    /// What frames of a mirror say.
+    pub mirror: Option<&'a MirrorLight<'a>>,
+}
+
+impl Known<'_> {
+    /// The light by the mirror alone, where there are enough frames of it; else it is left as it was, for
+    /// this reason.
+    fn by_mirror_or(&self, rig: &Rig, left: LightState) -> Result<Light, CalibrateError> {
+        let Some(mirror) = self.mirror.filter(|m| m.frames() >= mirror::FEWEST) else {
+            return Ok(Light::left(left));
+        };
+        let (nominal, prior) = (values(&LIGHT, rig), priors(&LIGHT, rig));
+        let solution = mirror.alone(self.camera, |shared, own| {
+            states(&LIGHT, &nominal, &prior, shared, own)
+        })?;
+        Ok(Light {
+            state: LightState::FoundByMirror {
+                frames: mirror.frames(),
+            },
+            residuals: Vec::new(),
+            solution: Some(solution),
+        })
+    }
+}
+
+/// The light's part of a covariance of camera and light together.
+fn own_of(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let (at, light) = (CAMERA.len(), LIGHT.len());
+    covariance.view((at, at), (light, light)).into_owned()
 }
 
 /// The light, found or not.
 pub struct Light {
     state: LightState,
+    residuals: Vec<ShadingResidual>,
     solution: Option<LightSolution>,
 }
 
 impl Light {
-    /// Finds the light of a rig whose camera and target are known with `camera` as the covariance of
-    /// [`CAMERA`]'s numbers.
+    /// Finds the light of a rig whose camera and target are known.
     pub fn find(
         rig: &Rig,
         mut frames: Vec<ShadedFrame>,
-        camera: &DMatrix<f64>,
+        known: &Known<'_>,
     ) -> Result<Self, CalibrateError> {
         if frames.len() < FEWEST {
             let state = LightState::NoReference {
                 frames: frames.len(),
                 needed: FEWEST,
             };
-            return Ok(Self::left(state));
+            return known.by_mirror_or(rig, state);
         }
         let reference = ReferenceShape::of(rig);
         thin(&mut frames, reference);
-        let shading = Shading {
+        let mut shading = Shading {
             rig,
             frames: &frames,
+            mirror: known.mirror.and_then(MirrorTerm::new),
         };
         let level = ln_intensity(rig, &frames);
         let nominal = nominal(rig, level, reference);
@@ -99,6 +132,10 @@ impl Light {
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
         let everything = free(&[true; LIGHT.len()], prior.len());
         let first = solve_light(&shading, &nominal, &prior, &everything, (Some(&OWN), None))?;
+        // Residuals of shading are in units of a noise that is found with them.
+        if let Some(mirror) = &mut shading.mirror {
+            mirror.scale = first.noise;
+        }
         let all = solve_light(
             &shading,
             &nominal,
@@ -108,11 +145,10 @@ impl Light {
         )?;
         let within = all.noise * typical;
         if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
-            return Ok(Self::left(unlike(&all, within)));
+            return known.by_mirror_or(rig, unlike(&all, within));
         }
-        let covariance = joined(camera, &all.information, &prior)?;
-        let (at, light) = (CAMERA.len(), LIGHT.len());
-        let own = covariance.view((at, at), (light, light)).into_owned();
+        let covariance = joined(known.camera, &all.information, &prior)?;
+        let (light, own) = (LIGHT.len(), own_of(&covariance));
         let states = states(
             &LIGHT,
             &nominal[..light],
@@ -131,18 +167,22 @@ impl Light {
         // What the light was thought to be, with the intensity and the reference that fit it best.
         let held = free(&[false; LIGHT.len()], prior.len());
         let before = solve_light(&shading, &nominal, &prior, &held, (Some(&all.own), None))?;
-        let misfit = |solved: &Solved| {
-            let at = shading.at(&solved.shared);
-            median(frames.iter().map(|frame| frame.misfit(&at)).collect())
+        let at = [&before, &solved].map(|solved| shading.at(&solved.shared));
+        let residual = |frame: &ShadedFrame| ShadingResidual {
+            theta_i_deg: frame.light.theta_deg(),
+            share: [frame.misfit(&at[0]), frame.misfit(&at[1])],
         };
+        let residuals: Vec<ShadingResidual> = frames.iter().map(residual).collect();
+        let typical = |i: usize| median(residuals.iter().map(|r| r.share[i]).collect());
         let state = LightState::Found {
             frames: frames.len(),
-            shading: [misfit(&before), misfit(&solved)],
+            shading: [typical(0), typical(1)],
             lamp: solved.own[2],
             arm_deg: [solved.own[0], solved.own[1]],
         };
         Ok(Self {
             state,
+            residuals,
             solution: Some(LightSolution {
                 shared: solved.shared[..light].to_vec(),
                 covariance,
@@ -154,8 +194,14 @@ impl Light {
     fn left(state: LightState) -> Self {
         Self {
             state,
+            residuals: Vec::new(),
             solution: None,
         }
+    }
+
+    /// What its shading leaves, frame by frame.
+    pub fn residuals(&self) -> &[ShadingResidual] {
+        &self.residuals
     }
 
     /// A rig with this light.

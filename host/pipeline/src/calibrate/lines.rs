@@ -2,7 +2,7 @@
 
 use crate::calibrate::solve::Frames;
 use crate::calibrate::unknowns::{CAMERA, with_values};
-use gonia_brdf::Direction;
+use gonia_brdf::{Direction, Elementary};
 use gonia_imaging::LinePoint;
 use gonia_rig::{CameraModel, CameraShift, FrameRow, Rig};
 
@@ -20,6 +20,9 @@ pub const BIAS: [f64; 2] = [0.02, 0.02];
 
 /// A gap is taken to be no narrower than this, pixels.
 const NARROWEST_GAP_PX: f64 = 0.5;
+
+/// Steps in which an arm's offset is found: it is nearly linear.
+const ARM_ROUNDS: usize = 2;
 
 /// A residual of a point that the camera cannot see, standard deviations: as good as none.
 const NOWHERE: f64 = 1e6;
@@ -81,7 +84,7 @@ impl Frames for Lines<'_> {
 }
 
 /// How far outwards of the lines of a camera's prediction the points are, pixels.
-fn distances_px(
+pub fn distances_px(
     camera: &CameraModel,
     line_offset_mm: f64,
     view: Direction,
@@ -99,6 +102,54 @@ fn distances_px(
             None => f64::NAN,
         })
         .collect()
+}
+
+/// How far a camera's arm is from its reading in a frame, as its lines show: `arm_deg` are the standard
+/// deviations of θ and φ.
+pub fn arm_offset(
+    camera: &CameraModel,
+    line_offset_mm: f64,
+    frame: &LineFrame,
+    arm_deg: [f64; 2],
+) -> CameraShift {
+    let view = frame.row.pose.view;
+    let shift = |own: [f64; 2]| CameraShift {
+        theta: own[0].to_radians(),
+        phi: own[1].to_radians(),
+        ..CameraShift::default()
+    };
+    let off = |own: [f64; 2]| distances_px(camera, line_offset_mm, view, shift(own), &frame.points);
+    let mut own = [0.0; 2];
+    for _ in 0..ARM_ROUNDS {
+        let here = off(own);
+        let steps = [0, 1].map(|k| 0.1 * arm_deg[k]);
+        let beside = [0, 1].map(|k| {
+            let mut moved = own;
+            moved[k] += steps[k];
+            off(moved)
+        });
+        // Normal equations in degrees, with the arm's own scatter as the prior.
+        let mut normal =
+            [0, 1].map(|k| [0, 1].map(|l| f64::from(u8::from(k == l)) / arm_deg[k].powi(2)));
+        let mut right = [0, 1].map(|k| -own[k] / arm_deg[k].powi(2));
+        for (i, point) in frame.points.iter().enumerate() {
+            let slope = [0, 1].map(|k| (beside[k][i] - here[i]) / steps[k]);
+            let u = point.u_px.hypotenuse(OWN[2]);
+            if !(slope[0] + slope[1] + here[i]).is_finite() {
+                continue;
+            }
+            for k in 0..2 {
+                right[k] -= slope[k] * here[i] / (u * u);
+                for l in 0..2 {
+                    normal[k][l] += slope[k] * slope[l] / (u * u);
+                }
+            }
+        }
+        let det = normal[0][0] * normal[1][1] - normal[0][1] * normal[1][0];
+        own[0] += (normal[1][1] * right[0] - normal[0][1] * right[1]) / det;
+        own[1] += (normal[0][0] * right[1] - normal[1][0] * right[0]) / det;
+    }
+    shift(own)
 }
 
 /// RMS distance of a frame's lines from where a rig has them, pixels.

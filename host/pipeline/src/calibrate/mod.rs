@@ -15,14 +15,20 @@ mod choose;
 mod error;
 mod light;
 mod lines;
+mod mirror;
 mod numbers;
+mod orientation;
+mod residuals;
 mod shading;
 mod solve;
 mod unknowns;
 
+pub use choose::spread_poses;
 pub use error::CalibrateError;
 pub use light::LightState;
+pub use mirror::MirrorFit;
 pub use numbers::{Number, NumberState, Spread};
+pub use residuals::{LineResidual, Residuals, ShadingResidual};
 
 use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
 use crate::progress::{Cancelled, Progress, Step, step};
@@ -30,10 +36,13 @@ use choose::{chosen, spread};
 use gonia_brdf::Pose;
 use gonia_brdf::direction::angle_between;
 use gonia_formats::checksum;
-use gonia_imaging::{Registrar, SamplingGrid, Search};
+use gonia_imaging::{
+    Highlight, NoHighlight, Orientation, Registrar, SamplingGrid, Search, find_highlight,
+};
 use gonia_rig::{Calibration, Remark, Rig};
-use light::Light;
+use light::{Known, Light};
 use lines::{LineFrame, Lines, misfit_px};
+use mirror::{MirrorFrame, MirrorLight};
 use nalgebra::DMatrix;
 use numbers::{changes, direction_u, state_of};
 use rayon::prelude::*;
@@ -59,7 +68,7 @@ const LEAST_MISFIT_PX: f64 = 0.3;
 /// Frames of the first steps, whose camera is not known well yet: this share of the width.
 const FIRST_MISFIT_WIDTHS: f64 = 8e-3;
 /// More than this share of frames that do not fit are another rig's.
-const MISFITS: f64 = 0.15;
+pub(crate) const MISFITS: f64 = 0.15;
 
 /// A calibrated rig, and what speaks for it.
 #[derive(Clone, Debug)]
@@ -76,12 +85,16 @@ pub struct Calibrated {
     pub lines_px: [f64; 2],
     /// What became of the light.
     pub light: LightState,
+    /// What frames of a mirror say of it.
+    pub mirror: Option<MirrorFit>,
     /// By how much directions of light and view changed, degrees, over the frames.
     pub changes: [Spread; 2],
     /// Their standard uncertainties now, degrees.
     pub direction_u: [Spread; 2],
     /// Standard deviation of the camera arm's θ and φ from frame to frame, degrees.
     pub camera_arm_deg: [f64; 2],
+    /// What is left of lines and shading, for a picture.
+    pub residuals: Residuals,
     /// What is to be said of frames.
     pub remarks: Vec<Remark>,
 }
@@ -116,6 +129,7 @@ pub fn calibrate(
 struct Seen {
     lines: Vec<LineFrame>,
     shaded: Vec<ShadedFrame>,
+    mirrors: Vec<MirrorFrame>,
     checksum: String,
     remarks: Vec<Remark>,
 }
@@ -214,6 +228,7 @@ fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, Cal
     let (sampler, grid) = (FrameSampler::new(&camera), SamplingGrid::new(&camera));
     let looked = look.each(rows, |row, frame| {
         let points = registrar.line_points(frame, row.pose.view, Search::Near);
+        let orientation = registrar.orientation(frame, row.pose.view);
         let sampled = (row.role == Role::Reference && !points.is_empty())
             .then(|| sampler.sample(frame, row, Hidden::Find))
             .filter(|sampled| sampled.report.outcome == Outcome::Locked);
@@ -222,24 +237,49 @@ fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, Cal
             row: row.clone(),
             points,
         };
-        (lines, shaded, checksum::of_frame(frame))
+        let highlight = (row.role == Role::Mirror && !lines.points.is_empty()).then(|| {
+            let registration = registrar.register(frame, row.pose);
+            find_highlight(frame, &registration, &camera.target)
+        });
+        Shows {
+            lines,
+            shaded,
+            highlight,
+            orientation,
+            checksum: checksum::of_frame(frame),
+        }
     })?;
     gather(looked)
 }
 
-fn gather(
-    looked: Looked<(LineFrame, Option<ShadedFrame>, String)>,
-) -> Result<Seen, CalibrateError> {
+/// What one frame shows.
+struct Shows {
+    lines: LineFrame,
+    shaded: Option<ShadedFrame>,
+    highlight: Option<Result<Highlight, NoHighlight>>,
+    orientation: Option<Orientation>,
+    checksum: String,
+}
+
+fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
     let (total, mut lost, mut first_error) = (looked.len(), 0, None);
     let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
+    let (mut orientations, mut mirrors) = (Vec::new(), Vec::new());
     for one in looked {
         match one {
-            Ok((frame, values, sum)) => {
-                sums.push_str(&sum);
-                if !frame.points.is_empty() {
-                    lines.push(frame);
+            Ok(shows) => {
+                sums.push_str(&shows.checksum);
+                if let Some(highlight) = shows.highlight {
+                    mirrors.push(mirror_frame(&shows.lines, highlight)?);
                 }
-                shaded.extend(values);
+                if !shows.lines.points.is_empty() {
+                    orientations.push((shows.lines.row.frame, shows.orientation));
+                    let is_turned = matches!(shows.orientation, Some(Orientation::Turned(_)));
+                    if !is_turned {
+                        lines.push(shows.lines);
+                        shaded.extend(shows.shaded);
+                    }
+                }
             }
             Err(error) => {
                 lost += 1;
@@ -247,7 +287,7 @@ fn gather(
             }
         }
     }
-    let remarks = match first_error {
+    let mut remarks = match first_error {
         Some(error) if lost == total => return Err(CalibrateError::Frames(error)),
         Some(error) => vec![Remark::new(
             format_args!("{lost} of {total} frames"),
@@ -256,12 +296,32 @@ fn gather(
         )],
         None => Vec::new(),
     };
+    remarks.extend(orientation::judged(&orientations)?);
     Ok(Seen {
         lines,
         shaded,
+        mirrors,
         checksum: checksum::of_bytes(sums.as_bytes()),
         remarks,
     })
+}
+
+fn mirror_frame(
+    lines: &LineFrame,
+    highlight: Result<Highlight, NoHighlight>,
+) -> Result<MirrorFrame, CalibrateError> {
+    let row = &lines.row;
+    match highlight {
+        Ok(highlight) => Ok(MirrorFrame {
+            lines: lines.clone(),
+            highlight,
+        }),
+        Err(why) => Err(CalibrateError::NoHighlight {
+            frame: row.frame,
+            file: row.file.clone(),
+            why,
+        }),
+    }
 }
 
 /// The camera that fits lines that were found from far off; frames that it does not fit are left out.
@@ -476,7 +536,19 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let mut lines = seen.lines;
     let camera = find_camera(rig, looked_at, &mut lines)?;
     let with_camera = with_values(&CAMERA, rig, &camera.shared);
-    let light = Light::find(&with_camera, seen.shaded, &camera.covariance)?;
+    // Frames that another camera took show nothing of this one's light.
+    let is_kept = |mirror: &MirrorFrame| lines.iter().any(|line| line.row == mirror.lines.row);
+    let mut mirrors = seen.mirrors;
+    mirrors.retain(is_kept);
+    let arm_deg = [camera.own[0], camera.own[1]];
+    let mirror = MirrorLight::find(&with_camera, &mirrors, &camera.covariance, arm_deg)?;
+    let known = Known {
+        camera: &camera.covariance,
+        mirror: mirror.as_ref(),
+    };
+    let light = Light::find(&with_camera, seen.shaded, &known)?;
+    let mut remarks = seen.remarks;
+    remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
     let found = light.rig(&with_camera);
 
     let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
@@ -529,8 +601,14 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         changes: changes(rig, &found, &poses),
         direction_u,
         light: light.state(),
+        mirror: mirror.as_ref().map(MirrorLight::fit),
         camera_arm_deg: [camera.own[0], camera.own[1]],
-        remarks: seen.remarks,
+        remarks,
+        residuals: Residuals {
+            size_px: [rig.camera.width_px, rig.camera.height_px],
+            lines: residuals::of_lines(rig, &found, &lines),
+            shading: light.residuals().to_vec(),
+        },
         numbers,
         rig: Rig {
             calibration: Some(calibration),

@@ -39,6 +39,16 @@ pub enum NumberState {
     NotNeeded,
 }
 
+/// The light as found.
+pub struct LightSolution {
+    /// Values of the light.
+    pub shared: Vec<f64>,
+    /// Of camera and light together.
+    pub covariance: DMatrix<f64>,
+    /// What became of each number.
+    pub states: Vec<NumberState>,
+}
+
 impl Number {
     /// How well it is determined: the share of the prior's uncertainty that the frames took away.
     pub fn determined(&self) -> f64 {

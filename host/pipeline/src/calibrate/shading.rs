@@ -1,13 +1,15 @@
 //! What the shading on the reference shows, as a function of the light, its arm and the target.
 
+use crate::calibrate::mirror::{MirrorLight, PLACE};
 use crate::calibrate::solve::Frames;
-use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, Unknown, with_values};
+use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, Unknown, values, with_values};
 use crate::process::SampledFrame;
 use crate::process::central::{n_terms, terms};
 use crate::process::reflectance::KnownReference;
 use gonia_brdf::{Direction, Elementary, Vec3};
 use gonia_imaging::{IdealLight, SamplingGrid};
 use gonia_rig::{CameraModel, Rig};
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
 /// Standard deviations of a frame's own numbers: the light arm's θ and φ (degrees: what encoders keep), and
@@ -65,6 +67,38 @@ pub struct Shading<'a> {
     pub rig: &'a Rig,
     /// At least one frame.
     pub frames: &'a [ShadedFrame],
+    /// What a mirror says of the light.
+    pub mirror: Option<MirrorTerm>,
+}
+
+/// What a mirror says of the light's place, as residuals: a frame more, behind all others.
+pub struct MirrorTerm {
+    place: Vec<f64>,
+    /// A square root of the information.
+    root: DMatrix<f64>,
+    /// The common factor of the residuals' noise.
+    pub scale: f64,
+}
+
+impl MirrorTerm {
+    /// `None` where it says nothing.
+    pub fn new(mirror: &MirrorLight<'_>) -> Option<Self> {
+        let eigen = mirror.information.clone().symmetric_eigen();
+        let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+        let root = DMatrix::from_diagonal(&roots) * eigen.eigenvectors.transpose();
+        let is_told = root.iter().all(|v| v.is_finite()) && root.amax() > 0.0;
+        is_told.then(|| Self {
+            place: mirror.place.clone(),
+            root,
+            scale: 1.0,
+        })
+    }
+
+    fn residuals(&self, rig: &Rig) -> Vec<f64> {
+        let here = values(&LIGHT[..PLACE], rig);
+        let off = DVector::from_fn(PLACE, |k, _| here[k] - self.place[k]);
+        (self.scale * &self.root * off).as_slice().to_vec()
+    }
 }
 
 /// What is known of the reference's reflectance.
@@ -235,7 +269,7 @@ impl Frames for Shading<'_> {
     type At = (Rig, Vec<f64>);
 
     fn count(&self) -> usize {
-        self.frames.len()
+        self.frames.len() + usize::from(self.mirror.is_some())
     }
 
     fn at(&self, shared: &[f64]) -> (Rig, Vec<f64>) {
@@ -246,7 +280,13 @@ impl Frames for Shading<'_> {
     }
 
     fn residuals(&self, (rig, rest): &(Rig, Vec<f64>), frame: usize, own: &[f64]) -> Vec<f64> {
-        let frame = &self.frames[frame];
+        let Some(frame) = self.frames.get(frame) else {
+            return self
+                .mirror
+                .iter()
+                .flat_map(|mirror| mirror.residuals(rig))
+                .collect();
+        };
         let reading = Direction {
             theta: frame.light.theta + own[0].to_radians(),
             phi: frame.light.phi + own[1].to_radians(),

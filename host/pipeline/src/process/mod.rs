@@ -27,7 +27,7 @@ use crate::progress::Cancelled;
 use calibration::Calibrator;
 use gonia_brdf::{Direction, Sample};
 use gonia_formats::FileError;
-use gonia_imaging::{IdealLight, SamplingGrid};
+use gonia_imaging::{IdealLight, SamplingGrid, Turn};
 use gonia_rig::{CameraModel, Frame, Remark, Rig};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
@@ -59,6 +59,8 @@ pub struct Processed {
     pub offsets: Option<OffsetStatistics>,
     /// The reference.
     pub reference: ReferenceSummary,
+    /// Frames of a mirror, which are no samples.
+    pub mirrors: usize,
     /// What hid the target in the reference's frames.
     pub masks: Masks,
     /// What is to be said of frames: which cannot be read, and which are used although something speaks
@@ -133,6 +135,21 @@ pub enum ProcessError {
         refused: usize,
         /// What they agree in.
         what: String,
+    },
+    /// The orientation mark shows that the target lay turned; where it is hidden, frames do not show it.
+    #[error(
+        "the target (or every frame) is {turn} in {turned} of {frames} frames of the {}, as its orientation mark shows: turn it back and take them again; where it lay right, correct target.mark_mm, or turn the frames as the sensor saw them",
+        role.name()
+    )]
+    TargetTurned {
+        /// What lay on it.
+        role: Role,
+        /// How it lay.
+        turn: Turn,
+        /// Frames that show it so.
+        turned: usize,
+        /// All of the role.
+        frames: usize,
     },
     /// Eq. (3) needs more of the reference than was measured.
     #[error(transparent)]
@@ -228,6 +245,7 @@ pub fn process_sampled(
             references.extend(found);
         },
     )?;
+    rig_check::check_orientation(&frames, Role::Reference)?;
     if references.is_empty() && !reference.is_empty() {
         if let Some(alike) = rig_check::refused_alike(rig, &frames) {
             let (refused, what) = (reference.len(), alike.to_string());
@@ -261,6 +279,7 @@ pub fn process_sampled(
             left_out += counts;
         },
     )?;
+    rig_check::check_orientation(&frames, Role::Material)?;
     let mut remarks = rig_check::doubts(rig, rows, &frames);
     remarks.extend(calibrator.doubts(rig, &bench.grid));
     Ok(Processed {
@@ -270,6 +289,7 @@ pub fn process_sampled(
         frames,
         left_out,
         reference: calibrator.summary(),
+        mirrors: of_role(Role::Mirror).len(),
         remarks,
         masks: calibrator.into_masks(),
     })

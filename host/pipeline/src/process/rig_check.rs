@@ -3,10 +3,11 @@
 //! One frame that is not where its pose puts it may be a slip; frames that are all off alike show a rig
 //! that is another than it is said to be.
 
+use crate::process::ProcessError;
 use crate::process::account::{FrameReport, OffsetStatistics, Outcome, Refusal};
 use gonia_brdf::Elementary;
-use gonia_imaging::RegistrationFailure;
-use gonia_rig::{FrameRow, Remark, Rig};
+use gonia_imaging::{RegistrationFailure, Turn};
+use gonia_rig::{FrameRow, Remark, Rig, Role};
 use std::fmt;
 
 /// So many refused frames must agree, and so large a share of all that do not show the target in its place.
@@ -18,6 +19,9 @@ const ALIKE: f64 = 0.25;
 const ALIKE_PX_PER_1000: f64 = 2.0;
 const ALIKE_DEG: f64 = 0.1;
 const ALIKE_SIZE: f64 = 0.002;
+/// So many frames must show the target turned alike, and more than this share of those of their role.
+const LEAST_TURNED: usize = 2;
+const SHARE_TURNED: f64 = 0.15;
 /// A larger share of the used frames than this, kept by their pose alone, is said; and no fewer than so many.
 const BY_POSE_SHARE: f64 = 0.05;
 const LEAST_BY_POSE: usize = 2;
@@ -31,6 +35,8 @@ const STEEP_DEG: f64 = 20.0;
 const CLEAR: f64 = 4.0;
 
 const REMEDY: &str = "run gonia calibrate DIR -o DIR/rig.toml, and process again";
+/// The same of a target that lies turned.
+const REMEDY_TURNED: &str = "turn it back and take the frames again; where it lay right, correct target.mark_mm, or turn the frames as the sensor saw them";
 
 /// What many frames have in common that do not show the target in its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +56,7 @@ enum Off {
     Size(f64),
     Arm(f64),
     Layout,
+    Turned(Turn),
 }
 
 impl Off {
@@ -60,6 +67,7 @@ impl Off {
             RegistrationFailure::Resized { share } => Self::Size(share),
             RegistrationFailure::FarFromPose { offset_deg } => Self::Arm(offset_deg),
             RegistrationFailure::WrongLayout { .. } => Self::Layout,
+            RegistrationFailure::TargetTurned(turn) => Self::Turned(turn),
             RegistrationFailure::LinesMissing { .. } | RegistrationFailure::Turned(_) => {
                 return None;
             }
@@ -78,6 +86,7 @@ impl Off {
             }
             (Self::Size(a), Self::Size(b)) => within(a, b, ALIKE_SIZE),
             (Self::Layout, Self::Layout) => true,
+            (Self::Turned(a), Self::Turned(b)) => a == b,
             _ => false,
         }
     }
@@ -85,11 +94,17 @@ impl Off {
 
 impl fmt::Display for Alike {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the rig is not what it says: ")?;
         let of = match self.of {
             of if of == self.frames => format!("all {of}"),
             of => format!("{} of {of}", self.frames),
         };
+        if let Off::Turned(turn) = self.off {
+            return write!(
+                f,
+                "the target is {turn}: {of} frames that do not show it as it should lie show its orientation mark there"
+            );
+        }
+        write!(f, "the rig is not what it says: ")?;
         write!(f, "{of} frames that do not show the target in its place ")?;
         match self.off {
             Off::Shift([right, down]) => write!(
@@ -115,6 +130,7 @@ impl fmt::Display for Alike {
                 f,
                 "show four lines that are not laid out as its camera sees them"
             ),
+            Off::Turned(_) => Ok(()),
         }
     }
 }
@@ -122,7 +138,10 @@ impl fmt::Display for Alike {
 impl Alike {
     /// As a warning.
     pub fn remark(&self) -> Remark {
-        Remark::new("rig.toml", self, REMEDY)
+        match self.off {
+            Off::Turned(_) => Remark::new("frames", self, REMEDY_TURNED),
+            _ => Remark::new("rig.toml", self, REMEDY),
+        }
     }
 }
 
@@ -147,6 +166,32 @@ pub fn refused_alike(rig: &Rig, frames: &[FrameReport]) -> Option<Alike> {
         of: not_there.len(),
         off,
     })
+}
+
+/// Refuses a target that lay turned: frames that hide its mark do not show it, and would be used.
+pub fn check_orientation(frames: &[FrameReport], role: Role) -> Result<(), ProcessError> {
+    let of_role = || frames.iter().filter(|frame| frame.role == role);
+    let turns = of_role().filter_map(|frame| match frame.outcome {
+        Outcome::Refused(Refusal::NotTheTarget(RegistrationFailure::TargetTurned(turn))) => {
+            Some(turn)
+        }
+        _ => None,
+    });
+    let turns: Vec<Turn> = turns.collect();
+    let count = |turn: Turn| turns.iter().filter(|t| **t == turn).count();
+    let most = turns.iter().copied();
+    let most = most.reduce(|a, b| if count(b) > count(a) { b } else { a });
+    let all = of_role().count();
+    let few = |turned: usize| turned < LEAST_TURNED || (turned as f64) <= SHARE_TURNED * all as f64;
+    match most {
+        Some(turn) if !few(count(turn)) => Err(ProcessError::TargetTurned {
+            role,
+            turn,
+            turned: count(turn),
+            frames: all,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// What speaks against the rig in what became of its frames.
@@ -213,7 +258,6 @@ mod tests {
     use super::*;
     use gonia_brdf::Pose;
     use gonia_imaging::PoseOffset;
-    use gonia_rig::Role;
 
     fn report(frame: u32, outcome: Outcome, theta_deg: f64) -> FrameReport {
         FrameReport {
@@ -248,6 +292,22 @@ mod tests {
         );
         let said = alike(&[shifted(6.0), rolled(0.1), shifted(5.5), shifted(6.2)]).unwrap();
         assert!(said.contains("+6.0 pixels"), "{said}");
+        let turned = |turn| refused(RegistrationFailure::TargetTurned(turn));
+        let said = alike(&[
+            turned(Turn::Left),
+            turned(Turn::Left),
+            missing,
+            turned(Turn::Left),
+        ]);
+        let said = said.unwrap();
+        assert!(
+            said.starts_with("the target is turned by 90 degrees anticlockwise: 3 of 4"),
+            "{said}"
+        );
+        assert_eq!(
+            alike(&[turned(Turn::Left), turned(Turn::Half), turned(Turn::Right)]),
+            None
+        );
         // Too few, each its own way, or a minority.
         assert_eq!(alike(&[rolled(0.7), rolled(0.7)]), None);
         assert_eq!(
@@ -256,6 +316,28 @@ mod tests {
         );
         let many = [missing; 4];
         assert_eq!(alike(&[&many[..], &[rolled(0.7); 3]].concat()), None);
+    }
+
+    #[test]
+    fn a_target_that_lay_turned_is_refused_though_other_frames_hide_it() {
+        let turned = |turn| refused(RegistrationFailure::TargetTurned(turn));
+        let frames = |turned_frames: &[FrameReport], others: u32| {
+            let others = (0..others).map(|i| report(i, Outcome::Locked, 0.0));
+            let all: Vec<FrameReport> = others.chain(turned_frames.iter().copied()).collect();
+            check_orientation(&all, Role::Material)
+        };
+        assert!(frames(&[], 5).is_ok());
+        assert!(frames(&[turned(Turn::Left); 1], 5).is_ok());
+        assert!(frames(&[turned(Turn::Left); 3], 20).is_ok());
+        let error = frames(&[turned(Turn::Left); 4], 16)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("anticlockwise in 4 of 20 frames of the material"),
+            "{error}"
+        );
+        let other = [turned(Turn::Half), turned(Turn::Left)];
+        assert!(frames(&other, 2).is_ok());
     }
 
     #[test]

@@ -31,6 +31,9 @@ pub struct UnattendedSession<'a> {
     pub settings: &'a SessionSettings,
     /// Where raw frames are kept, if they are: below this folder.
     pub keep_frames: Option<PathBuf>,
+    /// The frames are for a calibration of the rig: only what lies on the target first is taken, and frames are
+    /// kept whether or not they show the target where the rig has it.
+    pub is_calibration: bool,
     /// The commanded pose stands for the arms' reading, so that every take of a pose is the same.
     pub exact: bool,
     /// A person's orders.
@@ -78,7 +81,11 @@ impl UnattendedSession<'_> {
         let mut shooter = Shooter::new(arms);
         let mut totals = Totals::default();
         let mut result = self.home(&mut shooter);
-        for role in session.roles() {
+        let roles = match self.is_calibration {
+            true => &session.roles()[..1],
+            false => session.roles(),
+        };
+        for role in roles {
             let (missing, baseline, is_complete) = {
                 let writer = lock(&writer);
                 let state = writer.state();
@@ -121,12 +128,12 @@ impl UnattendedSession<'_> {
                 &mut totals,
             );
             // While the reference still lies there.
-            if result.is_ok() && *role == Role::Reference && !lock(&camera).changes_the_sample() {
+            let is_last = roles.last() == Some(role);
+            if result.is_ok() && !is_last && !lock(&camera).changes_the_sample() {
                 result = if_none_is_given_up(lock(&writer).state(), &[Role::Reference]);
             }
         }
-        let result =
-            result.and_then(|()| if_none_is_given_up(lock(&writer).state(), session.roles()));
+        let result = result.and_then(|()| if_none_is_given_up(lock(&writer).state(), roles));
         let (end, reason) = how_it_ended(&result);
         rest_arms(&mut shooter, &result, session.plan().first());
         let took = began.elapsed();

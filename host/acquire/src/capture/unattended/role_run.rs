@@ -101,6 +101,8 @@ impl RoleRun<'_> {
             has_reference: self.has_reference,
             writer,
             frames: self.session.keep_frames.clone(),
+            is_calibration: self.session.is_calibration,
+            is_calibrated: self.session.rig.calibration.is_some(),
             baseline,
             watch: self.session.watch,
         };
