@@ -136,11 +136,13 @@ impl Fill {
                 fill(samples, &options, &progress.watch()).with_context(|| names.clone())?;
             self.write(filled, facts, &progress)?
         } else {
+            let scale = samples.scale;
             let filled = fill_to_file(samples, &options, &self.output, &facts, &progress.watch())
                 .with_context(|| names.clone())?;
             remarks::print(&filled.remarks);
             let mut rows = describe(&filled.counts, &filled.settings);
             rows.extend(origins(&filled.origins));
+            rows.push(albedo(&filled.albedo, scale));
             rows
         };
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));

@@ -130,14 +130,19 @@ fn run(folder: &Path, writer: SessionWriter, sim: &SimRig, camera: Box<dyn Camer
 }
 
 /// Reference and material through the camera; the person in between is this function.
-fn session_under(troubles: GigeTroubles) -> (tempfile::TempDir, [Ended; 2]) {
+fn session_under(pixel_format: &str, troubles: GigeTroubles) -> (tempfile::TempDir, [Ended; 2]) {
     let folder = tempfile::tempdir().unwrap();
-    let rig = rig();
+    let mut rig = rig();
+    let setup = Genicam {
+        pixel_format: pixel_format.into(),
+        ..setup()
+    };
+    rig.source = Some(Source::Genicam(setup.clone()));
     let sim = arms();
     let device = gige(&rig, &sim, troubles);
     let exposures_s = &rig.session.as_ref().unwrap().exposures_s;
     let open = || {
-        let camera = GenicamCamera::open(&rig, &setup(), exposures_s);
+        let camera = GenicamCamera::open(&rig, &setup, exposures_s);
         Box::new(camera.unwrap_or_else(|error| panic!("{error}")))
     };
     device.put(Role::Reference);
@@ -193,14 +198,15 @@ fn a_session_through_gige_vision_has_the_samples_of_the_simulated_camera_whateve
     let expected = judge(direct.path());
 
     let began = Instant::now();
-    let (calm, ended) = session_under(|_| None);
+    let (calm, ended) = session_under("BayerRG12", |_| None);
     println!("calm: {:.1} s", began.elapsed().as_secs_f64());
     assert_eq!(ended[1].end, SessionEnd::Finished, "{}", ended[1].reason);
     assert_eq!(ended.map(|e| e.retaken), [0, 0], "{}", journal(calm.path()));
     let calm = judge(calm.path());
 
     let began = Instant::now();
-    let (troubled, ended) = session_under(|pulse| match pulse {
+    // Packed: two counts in three bytes.
+    let (troubled, ended) = session_under("BayerRG12p", |pulse| match pulse {
         10 => Some(GigeTrouble::PacketsLost(0.5)),
         31 | 120 => Some(GigeTrouble::PacketsLost(1.0)),
         52 => Some(GigeTrouble::Late(Duration::from_millis(1500))),

@@ -1,7 +1,7 @@
 //! A capture folder: `rig.toml`, `frames.csv` and the frames they speak of.
 
 use crate::FileError;
-use crate::frame_exr::read_frame_rows;
+use crate::frame_exr::{SpareFrame, read_frame_rows};
 use crate::frames_csv::{FrameList, read_frames_csv};
 use crate::rig_toml::read_rig;
 use gonia_rig::{Exposure, Frame, FrameRow, Rig, Role};
@@ -101,17 +101,24 @@ impl CaptureFolder {
     /// # Errors
     /// One line naming the file: see [`read_frame_of_size`](crate::frame_exr::read_frame_of_size).
     pub fn load(&self, row: &FrameRow) -> Result<Frame, FileError> {
-        self.load_rows(row, 0..self.rig.camera.height_px)
+        let rows = 0..self.rig.camera.height_px;
+        self.load_rows(row, rows, &mut SpareFrame::default())
     }
 
     /// As [`CaptureFolder::load`], of a frame of which only some rows are needed: the others may be NaN.
+    /// Its memory is that of `spare`, where it fits.
     ///
     /// # Errors
     /// As [`CaptureFolder::load`].
-    pub fn load_rows(&self, row: &FrameRow, rows: Range<usize>) -> Result<Frame, FileError> {
+    pub fn load_rows(
+        &self,
+        row: &FrameRow,
+        rows: Range<usize>,
+        spare: &mut SpareFrame,
+    ) -> Result<Frame, FileError> {
         let camera = &self.rig.camera;
         let size = [camera.width_px, camera.height_px];
-        read_frame_rows(&self.path_of(row), size, rows)
+        read_frame_rows(&self.path_of(row), size, rows, spare)
     }
 }
 

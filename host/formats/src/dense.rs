@@ -2,6 +2,7 @@
 //!
 //! A file is recognised by its first bytes, else by its ending; a name to write to by its ending.
 
+pub use crate::format::SeenRow;
 use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
 use crate::{FileError, table};
 use gonia_brdf::interpolate::{ByRows, ErrorBars};
@@ -35,8 +36,9 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
     (writer_of_name(path)?.whole)(path, file)
 }
 
-/// Writes a dense BRDF whole that does not fit memory, row by row as they are made. `progress` gets
-/// the share that is done, 0 ..= 1.
+/// Writes a dense BRDF whole that does not fit memory, row by row as they are made. `seen` gets each row too
+/// (its number and the three channels' values), in no order and from several threads; `progress` the share
+/// that is done, 0 ..= 1.
 ///
 /// # Errors
 /// As [`write_dense`].
@@ -46,9 +48,10 @@ pub fn write_dense_by_rows(
     rows: &ByRows<'_>,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
+    seen: SeenRow<'_>,
     progress: &Progress<'_>,
 ) -> Result<(), FileError> {
-    (writer_of_name(path)?.by_rows)(path, grid, rows, scale, provenance, progress)
+    (writer_of_name(path)?.by_rows)(path, grid, rows, scale, provenance, seen, progress)
 }
 
 /// Writes the standard errors of a dense BRDF whole, in the unit of its values, with each cell's

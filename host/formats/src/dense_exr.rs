@@ -3,7 +3,7 @@
 
 use crate::exr_planes::{ExrPlanes, NAMES, PREFIX, Plane, SCALE};
 use crate::exr_rows::{RowReader, write_rows};
-use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
+use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, SeenRow};
 use crate::{FileError, error_exr, exr_planes};
 use gonia_brdf::interpolate::ByRows;
 use gonia_brdf::progress::Progress;
@@ -63,12 +63,17 @@ fn write_by_rows(
     rows: &ByRows<'_>,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
+    seen: SeenRow<'_>,
     progress: &Progress<'_>,
 ) -> Result<(), FileError> {
     let attributes = exr_planes::own_attributes(scale, provenance);
     write_rows(path, grid.n_directions(), &attributes, |writer| {
         let cancelled = || std::io::Error::other("cancelled");
-        rows.each_row(progress, &|light, row| writer.write(light, row), cancelled)
+        let take = |light, row: [&[f32]; 3]| {
+            seen(light, row);
+            writer.write(light, row)
+        };
+        rows.each_row(progress, &take, cancelled)
     })
 }
 

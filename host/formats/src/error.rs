@@ -92,6 +92,16 @@ impl FileError {
             .caused_by(copy_of(error))
     }
 
+    /// Whether the system lacks what has nothing to do with this file (open files, memory, the network's
+    /// disk): other files would fail alike, and this one may well be sound.
+    pub fn is_of_the_system(&self) -> bool {
+        let cause = self.cause.0.as_deref();
+        let error = cause.and_then(|cause| cause.downcast_ref::<io::Error>());
+        error.is_some_and(|error| {
+            error.kind() != io::ErrorKind::InvalidFilename && of_the_system(error).is_some()
+        })
+    }
+
     /// The file that is wrong.
     pub fn path(&self) -> &Path {
         &self.text.path
@@ -121,7 +131,7 @@ impl Error for FileError {
     }
 }
 
-/// What to do about an error that has nothing to do with the file.
+/// What to do about an error that has nothing to do with what the file holds.
 fn of_the_system(error: &io::Error) -> Option<&'static str> {
     /// Unix: no more files for this process, for the system.
     const TOO_MANY_FILES: [i32; 2] = [24, 23];

@@ -62,8 +62,13 @@ pub(crate) type WriteRows = fn(
     &ByRows<'_>,
     Scale,
     &BTreeMap<String, String>,
+    SeenRow<'_>,
     &Progress<'_>,
 ) -> Result<(), FileError>;
+
+/// Gets every row of light (its number, the values of its views in three channels), in no order and from
+/// several threads.
+pub type SeenRow<'a> = &'a (dyn Fn(usize, [&[f32]; 3]) + Sync);
 
 /// See [`crate::dense::write_error_bars`].
 pub(crate) type WriteErrorBars =

@@ -32,7 +32,8 @@ const CLAIM_RATIO: u64 = 4096;
 /// without colours (see [`read_frame_of_size`]), or with values that are no radiance (NaN, below
 /// −10⁶). +∞ is one: a saturated pixel.
 pub fn read_frame(path: &Path) -> Result<Frame, FileError> {
-    read_placed(path, None, |header, file_bytes| {
+    let mut spare = SpareFrame::default();
+    read_placed(path, None, &mut spare, |header, file_bytes| {
         let (width, height) = (header.layer_size.width(), header.layer_size.height());
         let claimed = 12 * width as u64 * height as u64;
         if claimed > CLAIM_BYTES && claimed / CLAIM_RATIO > file_bytes {
@@ -57,11 +58,49 @@ pub fn read_frame(path: &Path) -> Result<Frame, FileError> {
 /// As [`read_frame`]; and when its size is another, its data window lies outside of it, or colours are
 /// missing or in several layers.
 pub fn read_frame_of_size(path: &Path, width: usize, height: usize) -> Result<Frame, FileError> {
-    read_frame_rows(path, [width, height], 0..height)
+    read_frame_rows(path, [width, height], 0..height, &mut SpareFrame::default())
+}
+
+/// Memory of frames that were read and are no longer needed, for the next one. Memory that is new costs an
+/// uncompressed frame more time than all the rest of its reading.
+#[derive(Default)]
+pub struct SpareFrame {
+    rgb: Vec<[f32; 3]>,
+    /// Pixels outside of these are NaN.
+    written: Range<usize>,
+}
+
+impl SpareFrame {
+    /// Keeps the memory of a frame of which [`read_frame_rows`] read `rows`, unchanged since.
+    pub fn keep(&mut self, frame: Frame, rows: &Range<usize>) {
+        self.written = rows.start * frame.width..rows.end * frame.width;
+        self.rgb = frame.rgb;
+    }
+
+    /// Pixels for a new frame, of which `needed` will be read: NaN outside of them.
+    fn take(&mut self, count: usize, needed: &Range<usize>) -> Vec<[f32; 3]> {
+        let mut rgb = std::mem::take(&mut self.rgb);
+        if rgb.len() != count {
+            // Zeros are not touched before they are used.
+            rgb = vec![[0.0; 3]; count];
+            self.written = 0..count;
+        }
+        let written = self.written.clone();
+        for old in [
+            written.start..written.end.min(needed.start),
+            written.start.max(needed.end)..written.end,
+        ] {
+            if let Some(old) = rgb.get_mut(old) {
+                old.fill([f32::NAN; 3]);
+            }
+        }
+        rgb
+    }
 }
 
 /// As [`read_frame_of_size`], of a frame of width × height pixels of which only some rows are needed:
 /// blocks of the file that show none of them are neither read nor decoded, and their pixels are NaN.
+/// The frame's memory is that of `spare`, where it fits.
 ///
 /// # Errors
 /// As [`read_frame_of_size`]; but what is wrong with blocks that are not read is not seen.
@@ -69,6 +108,7 @@ pub fn read_frame_rows(
     path: &Path,
     size: [usize; 2],
     rows: Range<usize>,
+    spare: &mut SpareFrame,
 ) -> Result<Frame, FileError> {
     let [width, height] = size;
     if looks_raw(path) {
@@ -78,7 +118,7 @@ pub fn read_frame_rows(
             "give its exposure time in the column exposure_s of frames.csv",
         ));
     }
-    read_placed(path, Some(rows), |header, _| {
+    read_placed(path, Some(rows), spare, |header, _| {
         let display = header.shared_attributes.display_window;
         let data = header.layer_size;
         let position = header.own_attributes.layer_position;
@@ -137,6 +177,8 @@ type Wrong = (usize, usize, usize, f32);
 /// A frame being read.
 struct Reading {
     frame: Frame,
+    /// Rows of it that are needed: others stay NaN, also where a block shows them too.
+    rows: Range<usize>,
     from: [i64; 2],
     wrong: Option<Wrong>,
     halves: Vec<f16>,
@@ -146,6 +188,7 @@ struct Reading {
 fn read_placed(
     path: &Path,
     rows: Option<Range<usize>>,
+    spare: &mut SpareFrame,
     place: impl FnOnce(&Header, u64) -> Result<Placement, (String, String)>,
 ) -> Result<Frame, FileError> {
     let refused = |(problem, remedy): (String, String)| FileError::new(path, problem, remedy);
@@ -164,7 +207,8 @@ fn read_placed(
     let Placement { size, from } = place(header, bytes).map_err(refused)?;
     let rows = rows.unwrap_or(0..size[1]);
     let mut read = Reading {
-        frame: blank(size, from, [data.width(), data.height()], &rows),
+        frame: blank(size, from, [data.width(), data.height()], &rows, spare),
+        rows: rows.clone(),
         from,
         wrong: None,
         halves: Vec::new(),
@@ -190,16 +234,21 @@ fn read_placed(
 }
 
 /// A frame whose data window begins at `from`, before it is read: NaN where nothing will be.
-fn blank(size: [usize; 2], from: [i64; 2], data: [usize; 2], rows: &Range<usize>) -> Frame {
+fn blank(
+    size: [usize; 2],
+    from: [i64; 2],
+    data: [usize; 2],
+    rows: &Range<usize>,
+    spare: &mut SpareFrame,
+) -> Frame {
     let [width, height] = size;
     let covers = |i: usize| from[i] <= 0 && from[i] + data[i] as i64 >= size[i] as i64;
-    let is_whole = covers(0) && covers(1);
-    let unseen = if is_whole { 0.0 } else { f32::NAN };
-    let mut rgb = vec![[unseen; 3]; width * height];
-    let (above, rest) = rgb.split_at_mut(rows.start.min(height) * width);
-    let below = (rows.end.min(height) * width).saturating_sub(above.len());
-    above.fill([f32::NAN; 3]);
-    rest[below..].fill([f32::NAN; 3]);
+    let needed = if covers(0) && covers(1) {
+        rows.start.min(height) * width..rows.end.min(height) * width
+    } else {
+        0..0
+    };
+    let rgb = spare.take(width * height, &needed);
     Frame { width, height, rgb }
 }
 
@@ -217,11 +266,12 @@ impl Reading {
         let Vec2(x, y) = line.location.position;
         let row = y as i64 + self.from[1];
         let start = x as i64 + self.from[0];
-        let (width, height) = (self.frame.width as i64, self.frame.height as i64);
+        let width = self.frame.width as i64;
+        let rows = self.rows.start as i64..self.rows.end.min(self.frame.height) as i64;
         // The line's own columns that lie in the frame.
         let skip = (-start).max(0);
         let end = (width - start).min(line.location.sample_count as i64);
-        if !(0..height).contains(&row) || skip >= end {
+        if !rows.contains(&row) || skip >= end {
             return Ok(());
         }
         let count = line.location.sample_count;
@@ -647,23 +697,27 @@ mod tests {
                     .unwrap();
                 let whole = read_frame_of_size(&path, 40, 310).unwrap();
                 assert_eq!(whole.rgb[5 * 40][0], 1.0);
+                let mut spare = SpareFrame::default();
                 for rows in [0..310, 137..138, 150..180, 0..3, 306..310, 20..20] {
-                    let some = read_frame_rows(&path, [40, 310], rows.clone()).unwrap();
+                    let some = read_frame_rows(&path, [40, 310], rows.clone(), &mut spare).unwrap();
                     for row in 0..310 {
                         let of = |frame: &Frame| -> Vec<u32> {
                             let pixels = &frame.rgb[row * 40..(row + 1) * 40];
                             pixels.iter().map(|pixel| pixel[0].to_bits()).collect()
                         };
-                        let unread = some.rgb[row * 40][0].is_nan() && !rows.contains(&row);
-                        assert!(unread || of(&some) == of(&whole), "{row} of {rows:?}");
+                        if rows.contains(&row) {
+                            assert_eq!(of(&some), of(&whole), "{row} of {rows:?}");
+                        } else {
+                            let pixels = &some.rgb[row * 40..(row + 1) * 40];
+                            assert!(pixels.iter().flatten().all(|v| v.is_nan()), "{row}");
+                        }
                     }
-                    // Most of what is not needed is not read.
-                    let missing = some.rgb.iter().filter(|p| p[0].is_nan()).count();
-                    assert!(missing / 40 + rows.len() >= 150, "{rows:?}: {missing}");
+                    // The next one is read into the same memory.
+                    spare.keep(some, &rows);
                 }
                 let bytes = std::fs::read(&path).unwrap();
                 std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-                let error = read_frame_rows(&path, [40, 310], 150..151).unwrap_err();
+                let error = read_frame_rows(&path, [40, 310], 150..151, &mut spare).unwrap_err();
                 assert!(error.to_string().contains("cut short"), "{error}");
             }
         }

@@ -1,7 +1,7 @@
 //! Samples → bins → dense BRDF.
 
 use crate::Error;
-use crate::doubts::{self, DirectionalAlbedo, Isotropy};
+use crate::doubts::{self, AlbedoRows, DirectionalAlbedo, Isotropy};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
@@ -251,7 +251,9 @@ pub struct FilledFile {
     pub settings: String,
     /// Where the cells' values come from.
     pub origins: OriginCounts,
-    /// What in the samples speaks against what they are taken for.
+    /// The directional albedo, its highest within the measured polar angles.
+    pub albedo: DirectionalAlbedo,
+    /// What in the samples and in the result speaks against what they are taken for.
     pub remarks: Vec<Remark>,
 }
 
@@ -349,14 +351,22 @@ pub fn fill_to_file(
     let mut provenance = provenance_of(&settings.to_string());
     provenance.insert("symmetry".into(), binned.symmetry.clone());
     provenance.extend(facts.clone());
+    let sums = AlbedoRows::new(grid);
+    let seen = |light: usize, row: [&[f32]; 3]| sums.add(light, row);
     step(progress, Step::InterpolatingAndWriting, |share| {
-        write_dense_by_rows(path, grid, &rows, scale, &provenance, share).map_err(Error::from)
+        write_dense_by_rows(path, grid, &rows, scale, &provenance, &seen, share)
+            .map_err(Error::from)
     })?;
+    let albedo = sums.finish(binned.highest_deg());
+    let counts = binned.counts();
+    let mut remarks = binned.remarks;
+    remarks.extend(doubts::remark_on_energy(&albedo, scale));
     Ok(FilledFile {
-        counts: binned.counts(),
+        counts,
         settings: settings.to_string(),
         origins: binned.origins,
-        remarks: binned.remarks,
+        albedo,
+        remarks,
     })
 }
 

@@ -61,6 +61,14 @@ impl FrameSource for Rendered {
                 "copy it again",
             ));
         }
+        #[cfg(unix)]
+        if row.pose == Pose::from_deg(NO_MORE_FILES) {
+            let none_left = std::io::Error::from_raw_os_error(24);
+            return Err(FileError::reading(
+                std::path::Path::new(&row.file),
+                &none_left,
+            ));
+        }
         if row.pose == Pose::from_deg(BLIND) {
             let [width, height] = [self.scene.geometry.width_px, self.scene.geometry.height_px];
             return Ok(Frame {
@@ -85,6 +93,9 @@ impl FrameSource for Rendered {
 const BLIND: [f64; 4] = [10.0, 10.0, 10.0, 10.0];
 /// A pose whose frame cannot be read.
 const UNREADABLE: [f64; 4] = [20.0, 20.0, 20.0, 20.0];
+/// A pose at whose frame the system has no more files to open.
+#[cfg(unix)]
+const NO_MORE_FILES: [f64; 4] = [25.0, 20.0, 20.0, 20.0];
 
 const POSES: [[f64; 4]; 6] = [
     [0.0, 0.0, 30.0, 300.0],
@@ -409,6 +420,7 @@ impl FrameSource for ByRows<'_> {
         &self,
         row: &FrameRow,
         rows: std::ops::Range<usize>,
+        _: &mut gonia_formats::frame_exr::SpareFrame,
     ) -> Result<Option<Frame>, FileError> {
         self.given.fetch_add(rows.len(), Ordering::Relaxed);
         let mut frame = self.rendered.load(row)?;
@@ -521,6 +533,21 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;
         assert!(logs.len() > 100 && mean.abs() < 0.002, "{theta}: {mean}");
     }
+}
+
+/// Frames that are sound are not left out because the system could not open them.
+#[cfg(unix)]
+#[test]
+fn the_systems_own_shortage_ends_the_work_and_is_named() {
+    let (mut source, rig) = lambertian(200);
+    source.add(Role::Material, NO_MORE_FILES);
+    let going = |_, _| ControlFlow::Continue(());
+    let error = process(&rig, &source, &Masks::default(), &going).unwrap_err();
+    let said = error.to_string();
+    assert!(
+        said.contains(".exr: cannot be read (Too many open files") && said.contains("ulimit -n"),
+        "{said}"
+    );
 }
 
 #[test]

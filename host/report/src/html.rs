@@ -4,7 +4,7 @@ use crate::charts::{seconds, thousands};
 use crate::files::RIVALS_FIGURE;
 use crate::input::ReportInput;
 use crate::subspaces::Subspace;
-use crate::{baselines, charts, explorer, fits, panels, shots, slices, spans, subspaces};
+use crate::{albedo, baselines, charts, explorer, fits, panels, shots, slices, spans, subspaces};
 use gonia_brdf::{Brdf, Grid};
 use gonia_formats::{FileError, FrameCounts, Pointing, Summary, write_whole_bytes};
 use gonia_render::svg::STYLE;
@@ -342,6 +342,7 @@ fn session_charts(input: &ReportInput<'_>, grid: Grid) -> Markup {
     let summary = input.summary;
     html! {
         div.charts {
+            (albedo::section(input.dense, summary.scale))
             @if let Some(rig) = input.rig {
                 section {
                     h2 { "Span of a frame" }

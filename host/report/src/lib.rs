@@ -11,6 +11,7 @@
 //! | [`frontier`] | the charts of `gonia chart`: error against cost and against images |
 //! | [`baselines`] | the figure of `gonia rivals`: each baseline's slice and renders |
 
+mod albedo;
 pub mod baselines;
 mod calibration;
 mod charts;

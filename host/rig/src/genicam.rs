@@ -1,7 +1,8 @@
 //! What `rig.toml` says of a GenICam camera.
 
+use crate::pixel_format::PixelFormat;
 use crate::rig_error::RigError;
-use crate::sensor::{Bayer, Sensor};
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::net::Ipv4Addr;
 
@@ -11,7 +12,7 @@ use std::net::Ipv4Addr;
 pub struct Genicam {
     /// Its IPv4 address. Cameras are never searched for.
     pub address: String,
-    /// As GenICam names it: Mono or Bayer with its pattern, and the bits, not packed.
+    /// As GenICam names it: Mono or Bayer with its pattern, and the bits, packed (`p`, `Packed`) or not.
     pub pixel_format: String,
     /// The camera's input that the trigger cable is on.
     #[serde(default = "default_trigger_source")]
@@ -36,44 +37,6 @@ pub enum ExposureTiming {
     Pulse,
     /// What the camera is set to; the pulse only begins it.
     Camera,
-}
-
-/// A pixel format whose counts lie each in one or two bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelFormat {
-    /// The colour filters, if it has any.
-    pub bayer: Option<Bayer>,
-    /// Bits of a count.
-    pub bits: u32,
-}
-
-impl PixelFormat {
-    /// By the name that GenICam has for it; `None` for any other.
-    pub fn named(name: &str) -> Option<Self> {
-        let filters = [
-            ("Mono", None),
-            ("BayerRG", Some(Bayer::Rggb)),
-            ("BayerBG", Some(Bayer::Bggr)),
-            ("BayerGR", Some(Bayer::Grbg)),
-            ("BayerGB", Some(Bayer::Gbrg)),
-        ];
-        filters.into_iter().find_map(|(prefix, bayer)| {
-            let bits: u32 = name.strip_prefix(prefix)?.parse().ok()?;
-            [8, 10, 12, 14, 16]
-                .contains(&bits)
-                .then_some(Self { bayer, bits })
-        })
-    }
-
-    /// Bytes of a pixel.
-    pub fn bytes(self) -> usize {
-        if self.bits > 8 { 2 } else { 1 }
-    }
-
-    /// The most counts there are.
-    pub fn white_counts(self) -> u16 {
-        (u32::from(u16::MAX) >> (16 - self.bits)) as u16
-    }
 }
 
 impl Genicam {
@@ -102,7 +65,7 @@ impl Genicam {
             return refuse(
                 "source.pixel_format",
                 format!("{name:?} is not one that is read"),
-                "give Mono, BayerRG, BayerBG, BayerGR or BayerGB with 8, 10, 12, 14 or 16, as in BayerRG12",
+                "give Mono, BayerRG, BayerBG, BayerGR or BayerGB with 8, 10, 12, 14, 16, 10p, 12p, 14p, 10Packed or 12Packed, as in BayerRG12",
             );
         };
         if let Some(feature) = self.features.iter().find(|text| !is_setting(text)) {
@@ -168,6 +131,7 @@ fn default_trigger_source() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::Bayer;
 
     fn camera() -> Genicam {
         Genicam {
@@ -187,24 +151,6 @@ mod tests {
             gain_e_per_count: 2.5,
             read_noise_e: 4.0,
             bayer: Some(Bayer::Rggb),
-        }
-    }
-
-    #[test]
-    fn formats_have_a_pattern_bits_and_bytes() {
-        let read = |name| PixelFormat::named(name).map(|f| (f.bayer, f.bytes(), f.white_counts()));
-        assert_eq!(read("Mono8"), Some((None, 1, 255)));
-        assert_eq!(read("BayerGB12"), Some((Some(Bayer::Gbrg), 2, 4095)));
-        assert_eq!(read("Mono16"), Some((None, 2, 65_535)));
-        for other in [
-            "Mono12Packed",
-            "Mono12p",
-            "RGB8",
-            "BayerRG",
-            "Mono9",
-            "mono8",
-        ] {
-            assert_eq!(read(other), None, "{other}");
         }
     }
 

@@ -27,6 +27,7 @@ mod frame_row;
 mod genicam;
 mod homography;
 mod number;
+mod pixel_format;
 mod raw_frame;
 mod remark;
 mod rig;
@@ -47,8 +48,9 @@ pub use dense::DenseFile;
 pub use figures::{Figures, StratumFigures};
 pub use frame::Frame;
 pub use frame_row::{Exposure, FrameRow, Role};
-pub use genicam::{ExposureTiming, Genicam, PixelFormat};
+pub use genicam::{ExposureTiming, Genicam};
 pub use homography::Homography;
+pub use pixel_format::PixelFormat;
 pub use raw_frame::RawFrame;
 pub use remark::Remark;
 pub use rig::{

@@ -238,18 +238,13 @@ impl GenicamCamera {
     fn raw_of(&self, buffer: &Buffer) -> Result<RawFrame, CameraError> {
         let [width, height] = self.size_px;
         let data = buffer.image_data();
-        let expected = width * height * self.format.bytes();
-        if data.len() != expected {
+        let pixels = width * height;
+        let Some(counts) = self.format.counts(&data, pixels) else {
+            let expected = self.format.bytes_of(pixels);
             return Err(self.failed(
                 format_args!("a frame has {} bytes instead of {expected}", data.len()),
                 "leave its size and pixel format to rig.toml",
             ));
-        }
-        let counts = if self.format.bytes() == 2 {
-            let (pairs, _) = data.as_chunks::<2>();
-            pairs.iter().map(|pair| u16::from_le_bytes(*pair)).collect()
-        } else {
-            data.into_iter().map(u16::from).collect()
         };
         Ok(RawFrame {
             width,

@@ -1,10 +1,10 @@
 //! Whether a dense BRDF reflects more than it receives.
 
-use gonia_brdf::DenseBrdf;
-use gonia_brdf::Elementary;
+use gonia_brdf::{DenseBrdf, Elementary, Grid};
 use gonia_rig::{Remark, Scale};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::sync::{Mutex, PoisonError};
 
 /// The directional albedo ρ(ω) = ∫ f(ω, ωv) cos θv dωv of a dense BRDF: the share of the light from ω that is
 /// reflected, per channel; without a unit where f is in 1/sr.
@@ -30,18 +30,18 @@ impl DirectionalAlbedo {
     /// Sums a BRDF; the highest albedo is looked for up to a polar angle of light.
     pub fn of(brdf: &DenseBrdf, up_to_deg: f64) -> Self {
         let grid = brdf.grid();
-        let (n, n_phi, step_deg) = (grid.n_directions(), grid.n_phi(), grid.step_deg());
-        let rings = ring_weights(grid.n_theta(), n_phi, step_deg);
-        let of_light = |light: usize| -> [f64; 3] {
-            [0, 1, 2].map(|c| {
-                let row = &brdf.planes()[c][light * n..(light + 1) * n];
-                row.chunks(n_phi)
-                    .zip(&rings)
-                    .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
-                    .sum()
-            })
+        let (n, rings) = (grid.n_directions(), Rings::of(grid));
+        let of_light = |light: usize| {
+            let row = |c: usize| &brdf.planes()[c][light * n..(light + 1) * n];
+            rings.albedo([0, 1, 2].map(row))
         };
         let all: Vec<[f64; 3]> = (0..n).into_par_iter().map(of_light).collect();
+        Self::of_lights(grid, &all, up_to_deg)
+    }
+
+    /// Of the albedos of all directions of light, in the grid's order.
+    fn of_lights(grid: Grid, all: &[[f64; 3]], up_to_deg: f64) -> Self {
+        let (n_phi, step_deg) = (grid.n_phi(), grid.step_deg());
         let by_polar_angle = all
             .chunks(n_phi)
             .map(|ring| [0, 1, 2].map(|c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64))
@@ -82,7 +82,65 @@ impl DirectionalAlbedo {
     }
 }
 
+/// Sums rows of a dense BRDF that is not in memory as a whole, as they are made.
+pub(crate) struct AlbedoRows {
+    grid: Grid,
+    rings: Rings,
+    lights: Mutex<Vec<[f64; 3]>>,
+}
+
+impl AlbedoRows {
+    pub fn new(grid: Grid) -> Self {
+        Self {
+            grid,
+            rings: Rings::of(grid),
+            lights: Mutex::new(vec![[0.0; 3]; grid.n_directions()]),
+        }
+    }
+
+    /// Adds the row of a direction of light.
+    pub fn add(&self, light: usize, row: [&[f32]; 3]) {
+        let albedo = self.rings.albedo(row);
+        let mut lights = self.lights.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(place) = lights.get_mut(light) {
+            *place = albedo;
+        }
+    }
+
+    /// When all rows were added: see [`DirectionalAlbedo::of`].
+    pub fn finish(self, up_to_deg: f64) -> DirectionalAlbedo {
+        let lights = self.lights.into_inner();
+        let lights = lights.unwrap_or_else(PoisonError::into_inner);
+        DirectionalAlbedo::of_lights(self.grid, &lights, up_to_deg)
+    }
+}
+
 /// ∫ sin θ cos θ dθ dφ of a node of each polar angle.
+struct Rings {
+    n_phi: usize,
+    weights: Vec<f64>,
+}
+
+impl Rings {
+    fn of(grid: Grid) -> Self {
+        Self {
+            n_phi: grid.n_phi(),
+            weights: ring_weights(grid.n_theta(), grid.n_phi(), grid.step_deg()),
+        }
+    }
+
+    /// ∫ f cos θv dωv of the values of all views.
+    fn albedo(&self, row: [&[f32]; 3]) -> [f64; 3] {
+        row.map(|values| {
+            values
+                .chunks(self.n_phi)
+                .zip(&self.weights)
+                .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
+                .sum()
+        })
+    }
+}
+
 fn ring_weights(n_theta: usize, n_phi: usize, step_deg: f64) -> Vec<f64> {
     let step = step_deg.to_radians();
     (0..n_theta)
@@ -124,7 +182,6 @@ pub(crate) fn remark(albedo: &DirectionalAlbedo, scale: Scale) -> Option<Remark>
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use gonia_brdf::Grid;
     use gonia_brdf::model::Lambert;
 
     #[test]
@@ -143,5 +200,22 @@ mod tests {
             let said = remark(&albedo, Scale::Absolute).unwrap().to_string();
             assert!(said.contains("1.200 of the light"), "{said}");
         }
+    }
+
+    #[test]
+    fn rows_added_in_any_order_have_the_albedo_of_the_whole() {
+        let grid = Grid::with_step_deg(15.0).unwrap();
+        let brdf = DenseBrdf::from_fn(grid, |light, view| {
+            [0, 1, 2].map(|c| (light + c * view) as f32)
+        });
+        let rows = AlbedoRows::new(grid);
+        let n = grid.n_directions();
+        for light in (0..n).rev() {
+            rows.add(
+                light,
+                [0, 1, 2].map(|c| &brdf.planes()[c][light * n..(light + 1) * n]),
+            );
+        }
+        assert_eq!(rows.finish(75.0), DirectionalAlbedo::of(&brdf, 75.0));
     }
 }

@@ -27,11 +27,13 @@ use crate::progress::Cancelled;
 use calibration::Calibrator;
 use gonia_brdf::{Direction, Sample};
 use gonia_formats::FileError;
+use gonia_formats::frame_exr::SpareFrame;
 use gonia_imaging::{IdealLight, SamplingGrid, Turn};
 use gonia_rig::{CameraModel, Frame, Remark, Rig};
 use rayon::prelude::*;
 use reference::{ReferenceFrame, References};
 use remarks::HeardRemarks;
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -159,6 +161,13 @@ pub enum ProcessError {
     Cancelled(#[from] Cancelled),
 }
 
+impl ProcessError {
+    /// Whether it would meet other frames alike: see [`FileError::is_of_the_system`].
+    fn is_of_the_system(&self) -> bool {
+        matches!(self, Self::Load { source, .. } if source.is_of_the_system())
+    }
+}
+
 /// Rows of a frame that show the target, as a share of all, up to which only they are read: with more, little
 /// is left out, and a frame that does not show it there is read twice.
 const WORTHWHILE: f64 = 0.9;
@@ -175,7 +184,7 @@ const BATCH: usize = 256;
 /// others are used.
 ///
 /// # Errors
-/// No frame of the material, none of a role that can be read and is of the right size, no good frame of
+/// The system lacks what every frame needs (open files, memory); no frame of the material, none of a role that can be read and is of the right size, no good frame of
 /// the reference, or too few of an unknown one.
 pub fn process(
     rig: &Rig,
@@ -194,6 +203,7 @@ pub fn process(
                 heard.of_frame(row, remarks);
                 Ok(sampler.sample(&frame, row, hidden))
             }
+            Err(error) if error.is_of_the_system() => Err(error),
             Err(error) => {
                 heard.unusable(row, error);
                 Ok(SampledFrame::refused(row, Refusal::Unusable))
@@ -295,6 +305,11 @@ pub fn process_sampled(
     })
 }
 
+thread_local! {
+    /// Of the frame that this thread sampled last.
+    static SPARE: RefCell<SpareFrame> = RefCell::default();
+}
+
 /// Samples a frame by the rows that show the target, where that is all there is to it: it is where its pose
 /// puts it, and reading these rows is cheaper than reading all.
 fn sample_rows(
@@ -308,8 +323,13 @@ fn sample_rows(
     if rows.len() as f64 > WORTHWHILE * rig.camera.height_px as f64 {
         return None;
     }
-    let frame = source.load_rows(row, rows.clone()).ok()??;
-    sampler.sample_rows(&frame, row, hidden, &rows)
+    // Taken, not borrowed: a thread that waits for parts of this frame may begin another one.
+    let mut spare = SPARE.take();
+    let frame = source.load_rows(row, rows.clone(), &mut spare).ok()??;
+    let sampled = sampler.sample_rows(&frame, row, hidden, &rows);
+    spare.keep(frame, &rows);
+    SPARE.set(spare);
+    sampled
 }
 
 /// Loads a frame, which must be of the size that the rig's camera has.

@@ -1,6 +1,7 @@
 //! Where frames come from.
 
 use crate::bracket::{Bracket, load_bracket};
+use gonia_formats::frame_exr::SpareFrame;
 use gonia_formats::{CaptureFolder, FileError};
 use gonia_rig::{Frame, Remark};
 use std::ops::Range;
@@ -24,11 +25,16 @@ pub trait FrameSource: Sync {
     }
 
     /// As [`FrameSource::load`], of a frame of which only some rows are needed: the others may be NaN.
-    /// None where reading some rows takes as long as reading all.
+    /// None where reading some rows takes as long as reading all. The frame may be in the memory of `spare`.
     ///
     /// # Errors
     /// As [`FrameSource::load`], as far as these rows show it.
-    fn load_rows(&self, _row: &FrameRow, _rows: Range<usize>) -> Result<Option<Frame>, FileError> {
+    fn load_rows(
+        &self,
+        _row: &FrameRow,
+        _rows: Range<usize>,
+        _spare: &mut SpareFrame,
+    ) -> Result<Option<Frame>, FileError> {
         Ok(None)
     }
 }
@@ -50,9 +56,14 @@ impl FrameSource for CaptureFolder {
         Ok((radiance.frame, remarks))
     }
 
-    fn load_rows(&self, row: &FrameRow, rows: Range<usize>) -> Result<Option<Frame>, FileError> {
+    fn load_rows(
+        &self,
+        row: &FrameRow,
+        rows: Range<usize>,
+        spare: &mut SpareFrame,
+    ) -> Result<Option<Frame>, FileError> {
         if self.exposures(row).is_empty() {
-            return self.load_rows(row, rows).map(Some);
+            return self.load_rows(row, rows, spare).map(Some);
         }
         Ok(None)
     }

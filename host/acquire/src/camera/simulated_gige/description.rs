@@ -31,9 +31,11 @@ pub const TRIGGER_WIDTH: u32 = 1;
 const LINE_1: u32 = 1;
 
 /// Names and numbers of the Pixel Format Naming Convention.
-const FORMATS: [(&str, u32); 11] = [
+const FORMATS: [(&str, u32); 19] = [
     ("Mono8", 0x0108_0001),
     ("Mono12", 0x0110_0005),
+    ("Mono10Packed", 0x010c_0004),
+    ("Mono12Packed", 0x010c_0006),
     ("Mono16", 0x0110_0007),
     ("BayerGR8", 0x0108_0008),
     ("BayerRG8", 0x0108_0009),
@@ -43,6 +45,12 @@ const FORMATS: [(&str, u32); 11] = [
     ("BayerRG12", 0x0110_0011),
     ("BayerGB12", 0x0110_0012),
     ("BayerBG12", 0x0110_0013),
+    ("BayerRG12Packed", 0x010c_002b),
+    ("BayerBG12p", 0x010c_0053),
+    ("BayerGB12p", 0x010c_0055),
+    ("BayerGR12p", 0x010c_0057),
+    ("BayerRG12p", 0x010c_0059),
+    ("BayerRG10p", 0x010a_0058),
 ];
 
 /// The format of a number.

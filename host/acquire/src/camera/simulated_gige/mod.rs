@@ -227,11 +227,7 @@ impl OnTheLine {
         let role = *lock(&self.role);
         let exposure_s = exposure_us as f64 * 1e-6;
         let counts = self.sight.counts(role, pulse, settings.format, exposure_s);
-        let bytes = if settings.format.bytes() == 2 {
-            counts.iter().flat_map(|c| c.to_le_bytes()).collect()
-        } else {
-            counts.iter().map(|c| *c as u8).collect()
-        };
+        let bytes = settings.format.bytes(&counts);
         let time_us = pulse.time_us + after_us - self.switched_on_us + 1_000_000;
         device.expose(bytes, 1000 * time_us, lost_share);
     }
