@@ -8,7 +8,7 @@ use crate::say::errln;
 use crate::{calibrate, remarks, table};
 use anyhow::{Context, Result, bail};
 use gonia_acquire::capture::{
-    ArmPortNames, Equipment, Orders, UnattendedSession, free_mb, keep_apart, travelling,
+    Equipment, Orders, UnattendedSession, free_mb, keep_apart, travelling,
 };
 use gonia_acquire::session::{
     Beginning, CALIBRATION, Claim, Entry, RIG, SessionEnd, SessionFolder, SessionWriter, now,
@@ -92,12 +92,7 @@ impl Capture {
             (Folder::Fresh(claim), poses(&drawn.rig))
         };
         let settings = drawn.rig.session.clone().unwrap_or_default();
-        let ports = ArmPortNames {
-            light: self.light.as_deref(),
-            camera: self.camera_arm.as_deref(),
-            simulated: self.simulated,
-        };
-        let there = self.there(&drawn.rig);
+        let (there, ports) = (self.there(&drawn.rig), self.ports());
         let mut equipment =
             Equipment::open(&there, &self.rig, ports, plan.len(), &settings, orders)?;
         equipment.check_reach(&plan)?;

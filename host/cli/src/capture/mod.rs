@@ -133,13 +133,8 @@ impl Capture {
             check_same(&self.folder.join(RIG), &used.text, &self.rig)?;
         }
 
-        let ports = ArmPortNames {
-            light: self.light.as_deref(),
-            camera: self.camera_arm.as_deref(),
-            simulated: self.simulated,
-        };
-        let mut equipment =
-            Equipment::open(&there, &self.rig, ports, plan.len(), &settings, &orders)?;
+        let (path, ports) = (&self.rig, self.ports());
+        let mut equipment = Equipment::open(&there, path, ports, plan.len(), &settings, &orders)?;
         if let Some(warning) = equipment.arms.calibration_warning()? {
             errln!("warning: {warning}");
         }
@@ -193,6 +188,14 @@ impl Capture {
             live.end(ended.end, &ended.reason);
         }
         self.conclude(&ended)
+    }
+
+    fn ports(&self) -> ArmPortNames<'_> {
+        ArmPortNames {
+            light: self.light.as_deref(),
+            camera: self.camera_arm.as_deref(),
+            simulated: self.simulated,
+        }
     }
 
     /// The session's folder, locked, and its poses: of the session in it, or of a new one.
