@@ -126,7 +126,10 @@ impl Capture {
         ctrlc::set_handler(move || on_interrupt.interrupt())
             .context("Ctrl-C cannot be caught on this system")?;
         let (there, used) = match is_calibrated {
-            true => (self.there(&drawn.rig), self.calibrated(&drawn, &orders)?),
+            true => {
+                self.keep_plan(&plan)?;
+                (self.there(&drawn.rig), self.calibrated(&drawn, &orders)?)
+            }
             false => (drawn.rig.clone(), drawn),
         };
         if let Folder::Begun(_) = folder {
@@ -165,9 +168,7 @@ impl Capture {
             Some(listening) => Some(LivePage::serve(listening, &session, &orders)?),
             None => None,
         };
-        if let Some(live) = &live {
-            say_where(live);
-        }
+        live.iter().for_each(say_where);
         let watchers: Vec<&dyn Watch> = match &live {
             Some(live) => vec![&terminal, live],
             None => vec![&terminal],
@@ -202,7 +203,11 @@ impl Capture {
     fn folder_and_plan(&self, drawn: &RigFile) -> Result<(Folder, Vec<Pose>)> {
         if !(self.resume && SessionFolder::is_session(&self.folder)) {
             let claim = Claim::new(&self.folder, drawn.beside().map(|b| b.0))?;
-            return Ok((Folder::Fresh(claim), self.fresh_plan(&drawn.rig)?));
+            let plan = match self.plan_of_calibration()? {
+                Some(plan) => plan,
+                None => self.fresh_plan(&drawn.rig)?,
+            };
+            return Ok((Folder::Fresh(claim), plan));
         }
         let (writer, session) = SessionWriter::resume(&self.folder)?;
         let plan = session.plan().to_vec();
