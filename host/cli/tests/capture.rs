@@ -115,8 +115,8 @@ fn sessions_survive_two_hundred_kills() {
 /// A rig whose frames show enough for a calibration.
 fn calibrated_session(folder: &Path) -> Vec<String> {
     let mut rig = small_rig();
-    (rig.camera.width_px, rig.camera.height_px) = (200, 200);
-    (rig.camera.focal_px, rig.camera.centre_px) = (312.5, [100.0; 2]);
+    (rig.camera.width_px, rig.camera.height_px) = (400, 400);
+    (rig.camera.focal_px, rig.camera.centre_px) = (625.0, [200.0; 2]);
     write_small(folder, &rig, 8);
     let at = |name: &str| text(&folder.join(name)).to_owned();
     vec![
@@ -130,7 +130,9 @@ fn calibrated_session(folder: &Path) -> Vec<String> {
     ]
 }
 
+/// `cargo test -p gonia --test capture calibrates_first -- --ignored`
 #[test]
+#[ignore = "two minutes: frames of which a rig can be found are not small"]
 fn a_session_that_calibrates_first_goes_on_after_kills_with_the_rig_that_its_frames_show() {
     let undisturbed = tempfile::tempdir().unwrap();
     let arguments = calibrated_session(undisturbed.path());

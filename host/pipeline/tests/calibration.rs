@@ -362,6 +362,7 @@ fn a_mirror_and_a_reference_together_are_as_good_as_the_better_of_them() {
     let light_of = |rows: Vec<FrameRow>| {
         let source = Rendered::new(&truth, rows, 0.005);
         let found = run(&source, 240).unwrap();
+        assert!(found.remarks.is_empty(), "{:?}", found.remarks);
         assert!(
             matches!(found.light, LightState::Found { .. }),
             "{:?}",
@@ -370,7 +371,14 @@ fn a_mirror_and_a_reference_together_are_as_good_as_the_better_of_them() {
         (errors(&found.rig, &truth)[0], found.direction_u[0])
     };
     let (alone, u_alone) = light_of(reference.clone());
-    let (both, u_both) = light_of([reference, mirror_rows(12, 6)].concat());
+    let together = [reference, mirror_rows(12, 6)].concat();
+    let (both, u_both) = light_of(together.clone());
+    // A mirror that lies 4 mm lower than is said contradicts the reference.
+    let mut drawn = nominal(240);
+    drawn.target.mirror_height_mm = Some(6.9);
+    let found = calibrate(&drawn, &Rendered::new(&truth, together, 0.005), &silent).unwrap();
+    let said = found.remarks[0].to_string();
+    assert!(said.contains("put it apart"), "{:?}", found.remarks);
     eprintln!("alone {alone:?} {u_alone:?}, both {both:?} {u_both:?}");
     assert!(u_both.p95 < u_alone.p95, "{u_both:?} {u_alone:?}");
     assert!(both[1] < alone[1].max(0.02), "{both:?} {alone:?}");

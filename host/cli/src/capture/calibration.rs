@@ -8,12 +8,13 @@ use crate::say::errln;
 use crate::{calibrate, remarks, table};
 use anyhow::{Context, Result, bail};
 use gonia_acquire::capture::{
-    ArmPortNames, Equipment, Orders, UnattendedSession, free_mb, keep_apart, travelling,
+    Equipment, Orders, UnattendedSession, free_mb, keep_apart, travelling,
 };
 use gonia_acquire::session::{
-    Beginning, CALIBRATION, Claim, Entry, RIG, SessionEnd, SessionFolder, SessionWriter, now,
+    Beginning, CALIBRATION, Claim, Entry, PLAN, RIG, SessionEnd, SessionFolder, SessionWriter, now,
 };
 use gonia_brdf::Pose;
+use gonia_formats::plan_csv::{read_plan_csv, write_plan_csv};
 use gonia_formats::rig_toml::{read_rig, write_rig};
 use gonia_formats::{CaptureFolder, FileError, check_writable};
 use gonia_pipeline::calibrate::spread_poses;
@@ -49,6 +50,34 @@ impl Capture {
             );
         }
         Ok(self.calibrate || has_frames)
+    }
+
+    /// The plan of a session whose calibration is not done: what it was begun with, whatever the command line
+    /// leaves out now.
+    pub(super) fn plan_of_calibration(&self) -> Result<Option<Vec<Pose>>> {
+        let (kept, frames) = (self.folder.join(PLAN), self.folder.join(CALIBRATION));
+        if !(self.resume && SessionFolder::is_session(&frames) && kept.is_file()) {
+            return Ok(None);
+        }
+        let plan = read_plan_csv(&kept)?;
+        if let Some(path) = &self.plan
+            && read_plan_csv(path)? != plan
+        {
+            bail!(
+                "{}: is not the plan that the session began with; leave --plan out, or begin a session in another folder",
+                path.display()
+            );
+        }
+        Ok(Some(plan))
+    }
+
+    /// Keeps the session's plan before its calibration, for a resume.
+    pub(super) fn keep_plan(&self, plan: &[Pose]) -> Result<()> {
+        let path = self.folder.join(PLAN);
+        if !path.is_file() {
+            write_plan_csv(&path, plan)?;
+        }
+        Ok(())
     }
 
     /// What the simulated rig's camera sees where the session is calibrated: a rig that was built with care,
@@ -92,12 +121,7 @@ impl Capture {
             (Folder::Fresh(claim), poses(&drawn.rig))
         };
         let settings = drawn.rig.session.clone().unwrap_or_default();
-        let ports = ArmPortNames {
-            light: self.light.as_deref(),
-            camera: self.camera_arm.as_deref(),
-            simulated: self.simulated,
-        };
-        let there = self.there(&drawn.rig);
+        let (there, ports) = (self.there(&drawn.rig), self.ports());
         let mut equipment =
             Equipment::open(&there, &self.rig, ports, plan.len(), &settings, orders)?;
         equipment.check_reach(&plan)?;

@@ -126,20 +126,18 @@ impl Capture {
         ctrlc::set_handler(move || on_interrupt.interrupt())
             .context("Ctrl-C cannot be caught on this system")?;
         let (there, used) = match is_calibrated {
-            true => (self.there(&drawn.rig), self.calibrated(&drawn, &orders)?),
+            true => {
+                self.keep_plan(&plan)?;
+                (self.there(&drawn.rig), self.calibrated(&drawn, &orders)?)
+            }
             false => (drawn.rig.clone(), drawn),
         };
         if let Folder::Begun(_) = folder {
             check_same(&self.folder.join(RIG), &used.text, &self.rig)?;
         }
 
-        let ports = ArmPortNames {
-            light: self.light.as_deref(),
-            camera: self.camera_arm.as_deref(),
-            simulated: self.simulated,
-        };
-        let mut equipment =
-            Equipment::open(&there, &self.rig, ports, plan.len(), &settings, &orders)?;
+        let (path, ports) = (&self.rig, self.ports());
+        let mut equipment = Equipment::open(&there, path, ports, plan.len(), &settings, &orders)?;
         if let Some(warning) = equipment.arms.calibration_warning()? {
             errln!("warning: {warning}");
         }
@@ -170,9 +168,7 @@ impl Capture {
             Some(listening) => Some(LivePage::serve(listening, &session, &orders)?),
             None => None,
         };
-        if let Some(live) = &live {
-            say_where(live);
-        }
+        live.iter().for_each(say_where);
         let watchers: Vec<&dyn Watch> = match &live {
             Some(live) => vec![&terminal, live],
             None => vec![&terminal],
@@ -195,11 +191,23 @@ impl Capture {
         self.conclude(&ended)
     }
 
+    fn ports(&self) -> ArmPortNames<'_> {
+        ArmPortNames {
+            light: self.light.as_deref(),
+            camera: self.camera_arm.as_deref(),
+            simulated: self.simulated,
+        }
+    }
+
     /// The session's folder, locked, and its poses: of the session in it, or of a new one.
     fn folder_and_plan(&self, drawn: &RigFile) -> Result<(Folder, Vec<Pose>)> {
         if !(self.resume && SessionFolder::is_session(&self.folder)) {
             let claim = Claim::new(&self.folder, drawn.beside().map(|b| b.0))?;
-            return Ok((Folder::Fresh(claim), self.fresh_plan(&drawn.rig)?));
+            let plan = match self.plan_of_calibration()? {
+                Some(plan) => plan,
+                None => self.fresh_plan(&drawn.rig)?,
+            };
+            return Ok((Folder::Fresh(claim), plan));
         }
         let (writer, session) = SessionWriter::resume(&self.folder)?;
         let plan = session.plan().to_vec();

@@ -11,7 +11,7 @@ use crate::calibrate::shading::{
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
 use crate::calibrate::{are_free, covariance_of, priors, started, states};
-use gonia_rig::Rig;
+use gonia_rig::{Remark, Rig};
 use nalgebra::DMatrix;
 
 /// Frames of the reference that a light needs.
@@ -19,6 +19,8 @@ const FEWEST: usize = 6;
 /// Standard deviation of a frame's level, or of values within a frame, beyond which a reference does not
 /// scatter as it is thought to (relative).
 const NOT_AS_THOUGHT: f64 = 0.02;
+/// A light that shading draws so many standard deviations from the mirror's contradicts it.
+const CONTRADICTS: f64 = 4.0;
 /// Values within a frame may differ by so many times their noise, however large that is.
 const NOISES: f64 = 3.0;
 
@@ -83,6 +85,7 @@ impl Known<'_> {
                 frames: mirror.frames(),
             },
             residuals: Vec::new(),
+            from_mirror: 0.0,
             solution: Some(solution),
         })
     }
@@ -98,6 +101,8 @@ fn own_of(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 pub struct Light {
     state: LightState,
     residuals: Vec<ShadingResidual>,
+    /// How far shading draws the light from where the mirror has it, standard deviations.
+    from_mirror: f64,
     solution: Option<LightSolution>,
 }
 
@@ -125,10 +130,6 @@ impl Light {
         let level = ln_intensity(rig, &frames);
         let nominal = nominal(rig, level, reference);
         let prior = with_target(rig, reference);
-        let unlike = |solved: &Solved, within| LightState::ReferenceUnlike {
-            level: solved.own[2],
-            within,
-        };
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
         let everything = free(&[true; LIGHT.len()], prior.len());
         let first = solve_light(&shading, &nominal, &prior, &everything, (Some(&OWN), None))?;
@@ -145,17 +146,13 @@ impl Light {
         )?;
         let within = all.noise * typical;
         if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
-            return known.by_mirror_or(rig, unlike(&all, within));
+            let level = all.own[2];
+            return known.by_mirror_or(rig, LightState::ReferenceUnlike { level, within });
         }
         let covariance = joined(known.camera, &all.information, &prior)?;
         let (light, own) = (LIGHT.len(), own_of(&covariance));
-        let states = states(
-            &LIGHT,
-            &nominal[..light],
-            &prior[..light],
-            &all.shared,
-            &own,
-        );
+        let (was, likely) = (&nominal[..light], &prior[..light]);
+        let states = states(&LIGHT, was, likely, &all.shared, &own);
         let kept = free(&are_free(&states), prior.len());
         let solved = solve_light(
             &shading,
@@ -167,12 +164,7 @@ impl Light {
         // What the light was thought to be, with the intensity and the reference that fit it best.
         let held = free(&[false; LIGHT.len()], prior.len());
         let before = solve_light(&shading, &nominal, &prior, &held, (Some(&all.own), None))?;
-        let at = [&before, &solved].map(|solved| shading.at(&solved.shared));
-        let residual = |frame: &ShadedFrame| ShadingResidual {
-            theta_i_deg: frame.light.theta_deg(),
-            share: [frame.misfit(&at[0]), frame.misfit(&at[1])],
-        };
-        let residuals: Vec<ShadingResidual> = frames.iter().map(residual).collect();
+        let residuals = residuals_of(&shading, &before, &solved);
         let typical = |i: usize| median(residuals.iter().map(|r| r.share[i]).collect());
         let state = LightState::Found {
             frames: frames.len(),
@@ -180,9 +172,11 @@ impl Light {
             lamp: solved.own[2],
             arm_deg: [solved.own[0], solved.own[1]],
         };
+        let mirror = shading.mirror.as_ref();
         Ok(Self {
             state,
             residuals,
+            from_mirror: mirror.map_or(0.0, |mirror| mirror.misfit(&solved.shared)),
             solution: Some(LightSolution {
                 shared: solved.shared[..light].to_vec(),
                 covariance,
@@ -195,8 +189,23 @@ impl Light {
         Self {
             state,
             residuals: Vec::new(),
+            from_mirror: 0.0,
             solution: None,
         }
+    }
+
+    /// That mirror and shading contradict each other.
+    pub fn remark(&self) -> Option<Remark> {
+        (self.from_mirror > CONTRADICTS).then(|| {
+            Remark::new(
+                "the light",
+                format_args!(
+                    "the mirror and the shading on the reference put it apart, by {:.0} standard deviations",
+                    self.from_mirror
+                ),
+                "check target.mirror_height_mm, that the mirror is flat, and the reference's reflectance",
+            )
+        })
     }
 
     /// What its shading leaves, frame by frame.
@@ -221,6 +230,16 @@ impl Light {
     pub fn solution(&self) -> Option<&LightSolution> {
         self.solution.as_ref()
     }
+}
+
+/// What the shading of each frame leaves, before and after.
+fn residuals_of(shading: &Shading<'_>, before: &Solved, after: &Solved) -> Vec<ShadingResidual> {
+    let at = [before, after].map(|solved| shading.at(&solved.shared));
+    let of_frame = |frame: &ShadedFrame| ShadingResidual {
+        theta_i_deg: frame.light.theta_deg(),
+        share: [frame.misfit(&at[0]), frame.misfit(&at[1])],
+    };
+    shading.frames.iter().map(of_frame).collect()
 }
 
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.

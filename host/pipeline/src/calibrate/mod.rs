@@ -264,7 +264,7 @@ struct Shows {
 fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
     let (total, mut lost, mut first_error) = (looked.len(), 0, None);
     let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
-    let (mut orientations, mut mirrors) = (Vec::new(), Vec::new());
+    let (mut orientations, mut mirrors, mut dark_mirrors) = (Vec::new(), Vec::new(), 0);
     for one in looked {
         match one {
             Ok(shows) => {
@@ -272,7 +272,9 @@ fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
                 if let Some(highlight) = shows.highlight {
                     mirrors.push(mirror_frame(&shows.lines, highlight)?);
                 }
-                if !shows.lines.points.is_empty() {
+                if shows.lines.points.is_empty() {
+                    dark_mirrors += usize::from(shows.lines.row.role == Role::Mirror);
+                } else {
                     orientations.push((shows.lines.row.frame, shows.orientation));
                     let is_turned = matches!(shows.orientation, Some(Orientation::Turned(_)));
                     if !is_turned {
@@ -297,6 +299,13 @@ fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
         None => Vec::new(),
     };
     remarks.extend(orientation::judged(&orientations)?);
+    if dark_mirrors > 0 {
+        remarks.push(Remark::new(
+            format_args!("{dark_mirrors} frames of the mirror"),
+            "they do not show the fiducial lines, and are left out",
+            "let the light reach the lines about the mirror too",
+        ));
+    }
     Ok(Seen {
         lines,
         shaded,
@@ -549,6 +558,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let light = Light::find(&with_camera, seen.shaded, &known)?;
     let mut remarks = seen.remarks;
     remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
+    remarks.extend(light.remark());
     let found = light.rig(&with_camera);
 
     let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
@@ -583,18 +593,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     }
     let direction_u = direction_u(rig, &unknowns, &shared, &covariance, &poses);
     let median = |rig: &Rig| Spread::of(lines.iter().map(|f| misfit_px(rig, f)).collect()).p50;
-    let calibration = Calibration {
-        date: String::new(),
-        frames: lines.len(),
-        checksum: seen.checksum,
-        names: numbers.iter().map(|n| n.name.to_owned()).collect(),
-        values: shared,
-        u: numbers.iter().map(|n| n.u).collect(),
-        covariance: covariance
-            .row_iter()
-            .map(|r| r.iter().copied().collect())
-            .collect(),
-    };
+    let calibration = record(&numbers, lines.len(), seen.checksum, shared, &covariance);
     Ok(Calibrated {
         frames: [looked_at, lines.len()],
         lines_px: [median(rig), median(&found)],
@@ -615,6 +614,28 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
             ..found
         },
     })
+}
+
+/// The calibration as `rig.toml` keeps it, without its date.
+fn record(
+    numbers: &[Number],
+    frames: usize,
+    checksum: String,
+    values: Vec<f64>,
+    covariance: &DMatrix<f64>,
+) -> Calibration {
+    Calibration {
+        date: String::new(),
+        frames,
+        checksum,
+        names: numbers.iter().map(|n| n.name.to_owned()).collect(),
+        values,
+        u: numbers.iter().map(|n| n.u).collect(),
+        covariance: covariance
+            .row_iter()
+            .map(|r| r.iter().copied().collect())
+            .collect(),
+    }
 }
 
 fn table(

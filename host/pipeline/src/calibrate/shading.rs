@@ -95,9 +95,17 @@ impl MirrorTerm {
     }
 
     fn residuals(&self, rig: &Rig) -> Vec<f64> {
-        let here = values(&LIGHT[..PLACE], rig);
-        let off = DVector::from_fn(PLACE, |k, _| here[k] - self.place[k]);
-        (self.scale * &self.root * off).as_slice().to_vec()
+        let off = self.off(&values(&LIGHT[..PLACE], rig));
+        (self.scale * off).as_slice().to_vec()
+    }
+
+    /// How far a light's place (the first numbers of [`LIGHT`]) is from the mirror's, standard deviations: RMS.
+    pub fn misfit(&self, place: &[f64]) -> f64 {
+        self.off(place).norm() / (PLACE as f64).sqrt()
+    }
+
+    fn off(&self, place: &[f64]) -> DVector<f64> {
+        &self.root * DVector::from_fn(PLACE, |k, _| place[k] - self.place[k])
     }
 }
 

@@ -81,10 +81,7 @@ impl UnattendedSession<'_> {
         let mut shooter = Shooter::new(arms);
         let mut totals = Totals::default();
         let mut result = self.home(&mut shooter);
-        let roles = match self.is_calibration {
-            true => &session.roles()[..1],
-            false => session.roles(),
-        };
+        let roles = self.roles(session);
         for role in roles {
             let (missing, baseline, is_complete) = {
                 let writer = lock(&writer);
@@ -148,6 +145,15 @@ impl UnattendedSession<'_> {
         };
         lock(&writer).note(&Entry::Stop(end, ended.reason.clone()))?;
         Ok(ended)
+    }
+
+    /// What is taken, in this order.
+    fn roles(&self, session: &SessionFolder) -> &'static [Role] {
+        let all = session.roles();
+        match (self.is_calibration, all.split_first()) {
+            (true, Some((first, _))) => std::slice::from_ref(first),
+            _ => all,
+        }
     }
 
     fn home(&self, shooter: &mut Shooter) -> Result<(), Halt> {
