@@ -40,7 +40,9 @@ pub fn images() -> Result<()> {
         let (elf, bin) = (image.with_extension("elf"), image.with_extension("bin"));
         std::fs::copy(&program, &elf).with_context(|| format!("{}", program.display()))?;
         let mut objcopy = Command::new(&objcopy);
-        run(objcopy.args(["-O", "binary"]).arg(&elf).arg(&bin))?;
+        // Between the vector table and the program lie the sectors of the settings: erased.
+        let arguments = ["-O", "binary", "--gap-fill", "0xFF"];
+        run(objcopy.args(arguments).arg(&elf).arg(&bin))?;
         println!("{}\n{}", elf.display(), bin.display());
     }
     Ok(())

@@ -219,6 +219,8 @@ impl Wiring {
                 core_is_held: self.state.core_is_held,
                 ..State::default()
             };
+            // An erase that was under way is no more.
+            host.hold(self.state.core_is_held);
         }
         let chip = &mut session.board_mut().chip;
         if self.state.is_erasing && peek(chip, at, FLASH_SR) & BSY == 0 {

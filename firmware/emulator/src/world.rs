@@ -53,6 +53,8 @@ pub struct Axis {
     pub setup_ns: u64,
     /// Shortest time between two steps, ns.
     pub shortest_ns: u64,
+    /// Motor and encoder are wired the other way round.
+    pub is_reversed: bool,
     /// The driver has current.
     pub is_enabled: bool,
     /// Steps that came while it had none.
@@ -73,6 +75,8 @@ pub struct Ssi {
     pub words: u64,
 }
 
+/// Counts of the ring.
+const COUNTS: u32 = 1 << 18;
 /// Time without a clock after which a ring latches anew, ns.
 const SSI_PAUSE_NS: u64 = 16_000;
 
@@ -87,6 +91,7 @@ impl Axis {
             last_ns: 0,
             setup_ns: u64::MAX,
             shortest_ns: u64::MAX,
+            is_reversed: false,
             is_enabled: false,
             unheard: 0,
             ssi_hz: 0.0,
@@ -104,7 +109,7 @@ impl Axis {
         self.edges += 1;
         self.given += if self.up { 1 } else { -1 };
         if self.is_enabled {
-            self.plant.step(self.up, now_ns / 1000);
+            self.plant.step(self.up != self.is_reversed, now_ns / 1000);
         } else {
             self.unheard += 1;
         }
@@ -116,6 +121,8 @@ impl Axis {
         let began_ns = now_ns.saturating_sub(byte_ns);
         if began_ns > self.ssi.last_ns + SSI_PAUSE_NS || self.ssi.words == 0 {
             let counts = self.plant.encoder_counts(began_ns / 1000);
+            let turned = counts.map(|counts| (COUNTS - counts) % COUNTS);
+            let counts = if self.is_reversed { turned } else { counts };
             // Rest bit, 18 bits of position, no error, no warning.
             self.ssi.word = counts.map_or(0, |counts| 1 << 31 | counts << 13 | 0b11 << 11);
             self.ssi.shifted = 0;

@@ -59,8 +59,9 @@ pub const ROWS: &[Row] = &[
     row("chain cut in mid-move", false, safety::chain_cut),
     row("encoder lost in mid-move", false, motion::encoder_lost),
     row("motor stalls in mid-move", false, motion::stall),
-    row("motor stalls in a stop", false, motion::stall_in_a_stop),
+    row("motor stalls in a stop", true, motion::stall_in_a_stop),
     row("host gone in mid-move", false, motion::host_gone),
+    row("reversed motor and encoder", false, motion::reversed),
     row("homing and 50 poses", false, motion::fifty_poses),
 ];
 

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use gonia_protocol::fault::FaultCode;
-use gonia_protocol::message::{ControllerState, Message, Move, RequestOutcome};
+use gonia_protocol::message::{ControllerState, Message, Move, RequestOutcome, Setting};
+use gonia_protocol::settings::{Axis, Key};
 
 use super::{Outcome, done, started, trigger};
 use crate::chips::lock;
@@ -129,6 +130,27 @@ pub fn stall_in_a_stop(elf: &Path) -> Result<Outcome> {
     let until_us = rig.now_us() + 60_000_000;
     lock(&rig.world).axes[1].plant.stall_until(until_us);
     must_fail(rig, id, FaultCode::FOLLOWING_ERROR)
+}
+
+/// θ wired the other way round, motor and encoder, and the settings that say so. (Without them homing runs up
+/// and fails.)
+pub fn reversed(elf: &Path) -> Result<Outcome> {
+    let mut rig = Rig::power_on(elf)?;
+    lock(&rig.world).axes[0].is_reversed = true;
+    rig.run_us(100_000)?;
+    rig.hello(7)?;
+    let mut set = |key: Key| {
+        let (axis, key, value) = (Axis::Theta, key.number(), 1);
+        rig.ask(&Message::SetSetting(Setting { axis, key, value }))
+    };
+    set(Key::MotorReversed)?;
+    set(Key::EncoderReversed)?;
+    rig.complete(&Message::Home, MOVE_US)?;
+    let target_udeg = [12_000_000, -170_000_000];
+    rig.complete(&Message::Move(Move { target_udeg }), MOVE_US)?;
+    let is = lock(&rig.world).true_deg();
+    ensure!((is[0] - 12.0).abs() < POINTING_DEG, "θ is at {:.3}°", is[0]);
+    done(rig, format!("homes, and stands at {:.3}°", is[0]))
 }
 
 pub fn host_gone(elf: &Path) -> Result<Outcome> {

@@ -15,6 +15,9 @@ use gonia_sim::rig::SimRig;
 use std::io;
 use std::path::Path;
 
+// What a rig has where it does not say otherwise is what the boards speak.
+const _: () = assert!(DEFAULT_BAUD == gonia_protocol::BAUD);
+
 /// Of a simulated rig that `rig.toml` does not describe.
 const SIMULATED: Source = Source::Simulated {
     seed: 1,
