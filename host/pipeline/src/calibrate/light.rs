@@ -1,7 +1,7 @@
 //! The light from the shading on the reference.
 
 use crate::calibrate::error::CalibrateError;
-use crate::calibrate::numbers::NumberState;
+use crate::calibrate::numbers::{NumberState, allow_for_kept};
 use crate::calibrate::shading::{
     LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, OWN, ReferenceShape, ShadedFrame, Shading,
     ln_intensity, target_unknowns, thin,
@@ -17,6 +17,8 @@ const FEWEST: usize = 6;
 /// Standard deviation of a frame's level, or of values within a frame, beyond which a reference does not
 /// scatter as it is thought to (relative).
 const NOT_AS_THOUGHT: f64 = 0.02;
+/// A frame's noise is seen in itself; the residuals' factor is found, and only zero makes no sense.
+const LEAST_FACTOR: f64 = 1e-6;
 /// Values within a frame may differ by so many times their noise, however large that is.
 const NOISES: f64 = 3.0;
 
@@ -110,16 +112,18 @@ impl Light {
         if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
             return Ok(Self::left(unlike(&all, within)));
         }
-        let covariance = joined(camera, &all.information, &prior)?;
+        let mut covariance = joined(camera, &all.information, &prior)?;
         let (at, light) = (CAMERA.len(), LIGHT.len());
         let own = covariance.view((at, at), (light, light)).into_owned();
         let states = states(
             &LIGHT,
+            rig,
             &nominal[..light],
             &prior[..light],
             &all.shared,
             &own,
         );
+        allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
         let kept = free(&are_free(&states), prior.len());
         let solved = solve_light(
             &shading,
@@ -217,6 +221,7 @@ fn solve_light(
         free,
         own: own.unwrap_or(&OWN),
         least_own: &LEAST_OWN,
+        least_noise: LEAST_FACTOR,
         finds_noise: own.is_none(),
     };
     let start = started(nominal, free, start);
