@@ -94,10 +94,6 @@ impl Light {
         let level = ln_intensity(rig, &frames);
         let nominal = nominal(rig, level, reference);
         let prior = with_target(rig, reference);
-        let unlike = |solved: &Solved, within| LightState::ReferenceUnlike {
-            level: solved.own[2],
-            within,
-        };
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
         let everything = free(&[true; LIGHT.len()], prior.len());
         let first = solve_light(&shading, &nominal, &prior, &everything, (Some(&OWN), None))?;
@@ -108,9 +104,8 @@ impl Light {
             &everything,
             (None, Some(&first)),
         )?;
-        let within = all.noise * typical;
-        if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
-            return Ok(Self::left(unlike(&all, within)));
+        if let Some(unlike) = unlike(&all, typical) {
+            return Ok(Self::left(unlike));
         }
         let mut covariance = joined(camera, &all.information, &prior)?;
         let (at, light) = (CAMERA.len(), LIGHT.len());
@@ -179,6 +174,13 @@ impl Light {
     pub fn solution(&self) -> Option<&LightSolution> {
         self.solution.as_ref()
     }
+}
+
+/// What a reference shows that does not scatter as it is thought to, where its values have a `typical` noise.
+fn unlike(solved: &Solved, typical: f64) -> Option<LightState> {
+    let (level, within) = (solved.own[2], solved.noise * typical);
+    let is_unlike = level > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical);
+    is_unlike.then_some(LightState::ReferenceUnlike { level, within })
 }
 
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.
