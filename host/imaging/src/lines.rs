@@ -49,6 +49,23 @@ impl Side {
     }
 }
 
+/// The edges about a line as predicted: outwards of its middle, pixels, as functions offset + slope · s of the
+/// place along it. Perspective makes them neither parallel nor symmetric about the middle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Edges {
+    /// The line's own edges: towards the material (negative), and away from it.
+    pub line: [[f64; 2]; 2],
+    /// The material's edge (negative).
+    pub material: [f64; 2],
+}
+
+impl Edges {
+    /// The line's inner and outer edge and the material's edge at a place.
+    pub fn at(&self, s: f64) -> [f64; 3] {
+        [self.line[0], self.line[1], self.material].map(|[offset, slope]| offset + slope * s)
+    }
+}
+
 /// One line as predicted, with the pixels around it. Positions are in ideal pixels: `s` runs from
 /// −1 to 1 between the crossings, `t` outwards from the predicted line.
 pub struct LineStrip {
@@ -56,6 +73,8 @@ pub struct LineStrip {
     along: [f64; 2],
     outward: [f64; 2],
     length: f64,
+    /// Edges of line and material.
+    pub edges: Edges,
     /// Stations in order.
     pub stations: Vec<Station>,
     /// The pixels of all stations' runs.
@@ -149,8 +168,23 @@ impl LineStrip {
             along,
             outward,
             length,
+            edges: Edges::default(),
             stations: Vec::new(),
             samples: Vec::new(),
+        };
+        let edge = |mm: f64| {
+            let [(s0, t0), (s1, t1)] = side.ends_mm(a).map(|end| {
+                let mut at = end;
+                at[side.axis] = side.sign * mm;
+                strip.place(target_to_px.apply(at))
+            });
+            let slope = (t1 - t0) / (s1 - s0);
+            [t0 - slope * s0, slope]
+        };
+        let half_width = 0.5 * target.line_width_mm;
+        strip.edges = Edges {
+            line: [edge(a - half_width), edge(a + half_width)],
+            material: edge(target.material_half_mm),
         };
         // Beside the corner of the sample there is nothing between material and desk to go by.
         let reach = (1.0 - 2.0 * CLEAR_OF_CROSSING_PX / length).min(target.material_half_mm / a);

@@ -1,12 +1,12 @@
 //! The brightness across a line as the camera blurs it, and its fit at one station.
 //!
 //! Outwards from the sample: material, a gap of desk, the line, desk. With Φ the blur's integral,
-//! the profile is D + L·[Φ((τ+w)/σ) − Φ((τ−w)/σ)] + M·Φ((−τ−e)/σ), τ the distance from the line's
-//! centre, w its half width, e the distance of the material's edge. D, L and M are free at every
+//! the profile is D + L·[Φ((τ−a)/σ) − Φ((τ−b)/σ)] + M·Φ((e−τ)/σ), τ the distance from the line's
+//! middle, a and b its inner and outer edge, e the material's edge. D, L and M are free at every
 //! station, so that shading, highlights and folds cannot shift the line; the material's edge is in
 //! the model because at grazing views it comes within a pixel of the line.
 
-use crate::lines::RunSample;
+use crate::lines::{Edges, RunSample};
 use gonia_brdf::Elementary;
 
 /// How far the fit's window goes past an edge, in standard deviations of the blur, plus a pixel.
@@ -15,13 +15,13 @@ const WINDOW_SIGMAS: f64 = 3.0;
 /// How far it goes into the material, likewise.
 const MATERIAL_SIGMAS: f64 = 1.5;
 
-/// Width of line and gap at a station, pixels.
+/// Edges of line and material about a station.
 #[derive(Clone, Copy)]
 pub struct LineProfile {
-    pub half_width: f64,
-    /// From the centre of the line to the edge of the material.
-    pub edge: f64,
-    /// Standard deviation of the blur.
+    pub edges: Edges,
+    /// The station's place along the line.
+    pub s: f64,
+    /// Standard deviation of the blur, pixels.
     pub sigma: f64,
 }
 
@@ -47,45 +47,46 @@ impl LineProfile {
     /// Fits a run whose line is `shift(sample)` from the predicted one. `None` with too few pixels.
     pub fn fit(&self, run: &[RunSample], shift: impl Fn(&RunSample) -> f64) -> Option<StationFit> {
         let margin = WINDOW_SIGMAS * self.sigma + 1.0;
-        let outer = self.half_width + margin;
+        let [near, far, edge] = self.edges.at(self.s);
+        let outer = far + margin;
         // A gap wide enough to stand in keeps the material out of it.
-        let clear = self.edge - WINDOW_SIGMAS * self.sigma;
-        let with_material = clear < self.half_width + margin;
+        let with_material = near - margin < edge + WINDOW_SIGMAS * self.sigma;
         // Little of the material: it may have a pattern of its own.
         let inner = if with_material {
-            self.edge + MATERIAL_SIGMAS * self.sigma + 1.0
+            edge - MATERIAL_SIGMAS * self.sigma - 1.0
         } else {
-            outer
+            near - margin
         };
         let mut rows: [Row; MAX_RUN] = [Row::default(); MAX_RUN];
         let mut n = 0;
         for sample in run {
             let tau = f64::from(sample.t) - shift(sample);
-            if tau < -inner || tau > outer || !sample.value.is_finite() {
+            if tau < inner || tau > outer || !sample.value.is_finite() {
                 continue;
             }
             if n == MAX_RUN {
                 break;
             }
-            rows[n] = self.row(tau, f64::from(sample.value), with_material);
+            rows[n] = self.row(sample, tau, with_material);
             n += 1;
         }
         fit_rows(&rows[..n], with_material)
     }
 
-    fn row(&self, tau: f64, value: f64, with_material: bool) -> Row {
+    fn row(&self, sample: &RunSample, tau: f64, with_material: bool) -> Row {
         let inverse = 1.0 / self.sigma;
-        let z1 = (tau + self.half_width) * inverse;
-        let z2 = (tau - self.half_width) * inverse;
+        let [near, far, edge] = self.edges.at(f64::from(sample.s));
+        let z1 = (tau - near) * inverse;
+        let z2 = (tau - far) * inverse;
         let ((c1, d1), (c2, d2)) = (normal(z1), normal(z2));
         let mut row = Row {
-            value,
+            value: f64::from(sample.value),
             basis: [c1 - c2, 1.0, 0.0],
             slope: [(d1 - d2) * inverse, 0.0],
             blur: [z2 * d2 - z1 * d1, 0.0],
         };
         if with_material {
-            let z = (-tau - self.edge) * inverse;
+            let z = (edge - tau) * inverse;
             let (c, d) = normal(z);
             row.basis[2] = c;
             row.slope[1] = -d * inverse;
@@ -205,18 +206,32 @@ fn normal(z: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
+    fn profile(half_width: f64, edge: f64, sigma: f64) -> LineProfile {
+        let edges = Edges {
+            line: [[-half_width, 0.0], [half_width, 0.0]],
+            material: [-edge, 0.0],
+        };
+        LineProfile {
+            edges,
+            s: 0.0,
+            sigma,
+        }
+    }
+
     fn run(profile: &LineProfile, at: f64, amplitudes: [f64; 3]) -> Vec<RunSample> {
         (-12..=12)
             .map(|k| {
                 let t = f64::from(k) + 0.3;
-                let row = profile.row(t - at, 0.0, true);
-                let value: f64 = (0..3).map(|i| amplitudes[i] * row.basis[i]).sum();
-                RunSample {
+                let mut sample = RunSample {
                     s: 0.0,
                     t: t as f32,
-                    value: value as f32,
+                    value: 0.0,
                     pixel: [0; 2],
-                }
+                };
+                let row = profile.row(&sample, t - at, true);
+                let value: f64 = (0..3).map(|i| amplitudes[i] * row.basis[i]).sum();
+                sample.value = value as f32;
+                sample
             })
             .collect()
     }
@@ -224,11 +239,7 @@ mod tests {
     #[test]
     fn a_hair_line_beside_a_brighter_material_is_placed_exactly() {
         // As at 400 px and θv = 75°: line 0.36 px thick, 1.2 px from the material.
-        let truth = LineProfile {
-            half_width: 0.18,
-            edge: 1.35,
-            sigma: 0.5,
-        };
+        let truth = profile(0.18, 1.35, 0.5);
         let run = run(&truth, 0.37, [0.25, 0.01, 0.4]);
         let (mut at, mut sigma) = (0.0, 0.6);
         for _ in 0..8 {
@@ -246,11 +257,7 @@ mod tests {
 
     #[test]
     fn a_flat_run_gains_nothing_from_a_line() {
-        let profile = LineProfile {
-            half_width: 0.7,
-            edge: 5.0,
-            sigma: 0.5,
-        };
+        let profile = profile(0.7, 5.0, 0.5);
         let mut flat = run(&profile, 0.0, [0.0, 0.3, 0.0]);
         for (i, sample) in flat.iter_mut().enumerate() {
             sample.value += [0.01, -0.01, 0.0][i % 3];

@@ -86,7 +86,7 @@ pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> L
     let starts = [0, 1, 2, 3].map(|i| match starts {
         Starts::Predicted => {
             let line = StripLine::default();
-            (line, sum_line(&strips[i], line, START_SIGMA_PX, target))
+            (line, sum_line(&strips[i], line, START_SIGMA_PX))
         }
         Starts::Around(hough) => best_start(&strips[i], hough[i], target),
     });
@@ -105,7 +105,7 @@ pub fn fit_lines(strips: &[LineStrip; 4], starts: &Starts, target: &Target) -> L
         }
         sigma = (sigma * step[8].clamp(-0.4, 0.4).exponential())
             .clamp(SIGMA_RANGE_PX[0], SIGMA_RANGE_PX[1]);
-        sums = [0, 1, 2, 3].map(|i| sum_line(&strips[i], lines[i], sigma, target));
+        sums = [0, 1, 2, 3].map(|i| sum_line(&strips[i], lines[i], sigma));
         if largest < 2e-3 && step[8].abs() < 1e-2 {
             break;
         }
@@ -136,18 +136,18 @@ fn best_start(
     target: &Target,
 ) -> (StripLine, LineSums) {
     let predicted = StripLine::default();
-    let sums = sum_line(strip, predicted, START_SIGMA_PX, target);
+    let sums = sum_line(strip, predicted, START_SIGMA_PX);
     let gap = target.line_offset_mm - target.material_half_mm - 0.5 * target.line_width_mm;
     let crowded = gap * strip.px_per_mm() < CROWDED_PX;
     if sums.share > PLAINLY_THERE && !crowded {
         return (predicted, sums);
     }
-    let mut near = few_steps(strip, predicted, sums, target);
+    let mut near = few_steps(strip, predicted, sums);
     if crowded {
         for offset in [-1.0, 1.0] {
             let start = StripLine { offset, slope: 0.0 };
-            let sums = sum_line(strip, start, START_SIGMA_PX, target);
-            let other = few_steps(strip, start, sums, target);
+            let sums = sum_line(strip, start, START_SIGMA_PX);
+            let other = few_steps(strip, start, sums);
             if other.1.badness() < near.1.badness() {
                 near = other;
             }
@@ -155,8 +155,8 @@ fn best_start(
     }
     match hough {
         Some(line) if line.distance(near.0) > SAME_LINE_PX => {
-            let sums = sum_line(strip, line, START_SIGMA_PX, target);
-            let far = few_steps(strip, line, sums, target);
+            let sums = sum_line(strip, line, START_SIGMA_PX);
+            let far = few_steps(strip, line, sums);
             if far.1.share > near.1.share + CLEARLY_BETTER {
                 far
             } else {
@@ -167,12 +167,7 @@ fn best_start(
     }
 }
 
-fn few_steps(
-    strip: &LineStrip,
-    mut line: StripLine,
-    mut sums: LineSums,
-    target: &Target,
-) -> (StripLine, LineSums) {
+fn few_steps(strip: &LineStrip, mut line: StripLine, mut sums: LineSums) -> (StripLine, LineSums) {
     for _ in 0..4 {
         let [a, b, c] = [sums.normal[0][0], sums.normal[0][1], sums.normal[1][1]];
         let det = a * c - b * b;
@@ -186,7 +181,7 @@ fn few_steps(
         .map(|d| d.clamp(-1.0, 1.0));
         line.offset += step[0];
         line.slope += step[1];
-        sums = sum_line(strip, line, START_SIGMA_PX, target);
+        sums = sum_line(strip, line, START_SIGMA_PX);
         if step[0].abs().max(step[1].abs()) < 0.05 {
             break;
         }
@@ -203,7 +198,7 @@ struct Shown<'a> {
 
 impl<'a> Shown<'a> {
     /// `None` where no station shows the line.
-    fn new(strip: &'a LineStrip, line: StripLine, sigma: f64, target: &Target) -> Option<Self> {
+    fn new(strip: &'a LineStrip, line: StripLine, sigma: f64) -> Option<Self> {
         let shift = |p: &RunSample| line.offset + line.slope * f64::from(p.s);
         let shows =
             |fit: &StationFit| fit.line > 0.0 && fit.gain > EXPLAINED * (fit.gain + fit.rss);
@@ -212,8 +207,8 @@ impl<'a> Shown<'a> {
             .iter()
             .filter_map(|station| {
                 let profile = LineProfile {
-                    half_width: 0.5 * target.line_width_mm * station.px_per_mm,
-                    edge: (target.line_offset_mm - target.material_half_mm) * station.px_per_mm,
+                    edges: strip.edges,
+                    s: station.s,
                     sigma,
                 };
                 let fit = profile.fit(&strip.samples[station.run.clone()], shift)?;
@@ -238,7 +233,7 @@ impl<'a> Shown<'a> {
     }
 }
 
-fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> LineSums {
+fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64) -> LineSums {
     let mut sums = LineSums {
         normal: [[0.0; 3]; 3],
         right: [0.0; 3],
@@ -247,7 +242,7 @@ fn sum_line(strip: &LineStrip, line: StripLine, sigma: f64, target: &Target) -> 
         scatter_px: 0.0,
         level: 0.0,
     };
-    let Some(shown) = Shown::new(strip, line, sigma, target) else {
+    let Some(shown) = Shown::new(strip, line, sigma) else {
         return sums;
     };
     sums.level = shown.level;
@@ -289,14 +284,8 @@ pub struct Piece {
 
 /// A found line in at most `count` pieces, each placed by its own stations: a lens that is not the one that
 /// the strip was cut for bends the line.
-pub fn pieces(
-    strip: &LineStrip,
-    line: StripLine,
-    sigma: f64,
-    target: &Target,
-    count: usize,
-) -> Vec<Piece> {
-    let Some(shown) = Shown::new(strip, line, sigma, target) else {
+pub fn pieces(strip: &LineStrip, line: StripLine, sigma: f64, count: usize) -> Vec<Piece> {
+    let Some(shown) = Shown::new(strip, line, sigma) else {
         return Vec::new();
     };
     #[derive(Clone, Copy, Default)]

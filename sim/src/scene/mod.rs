@@ -33,7 +33,7 @@ use noise::NoiseField;
 use occluder::Silhouette;
 use optics::Optics;
 use std::sync::Arc;
-use target::{Paint, TargetMap};
+use target::TargetMap;
 
 /// Where light, camera and target are, as plain numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -279,18 +279,26 @@ impl<'a> Painter<'a> {
     }
 
     fn target_radiance(&self, pixel: [f64; 2], point_mm: [f64; 2]) -> [f64; 3] {
-        let sigma_mm = || self.optics.blur_mm(pixel);
-        let Some(Paint { material, grey }) = self.target.paint(point_mm, sigma_mm) else {
+        let sigma_mm = self.optics.blur_across(pixel);
+        let Some(paint) = self.target.paint(point_mm, sigma_mm) else {
             return [0.0; 3];
         };
-        let point_m = point_mm.map(|c| c * 1e-3);
-        let (to_light, irradiance) = self.light.at(point_m);
-        let mut radiance = [grey * irradiance; 3];
+        let irradiance_at = |at_mm: [f64; 2]| self.light.at(at_mm.map(|c| c * 1e-3)).1;
+        let mut radiance = [0.0; 3];
+        for (albedo, at_mm) in [(paint.lines, paint.lines_at), (paint.desk, point_mm)] {
+            if albedo > 0.0 {
+                let grey = albedo * irradiance_at(at_mm);
+                radiance = radiance.map(|l| l + grey);
+            }
+        }
         if self.is_mirror {
             let lamp = self.lamp.as_ref().map_or(0.0, |lamp| lamp.radiance(pixel));
-            return radiance.map(|l| l + material * lamp);
+            return radiance.map(|l| l + paint.material * lamp);
         }
-        if material > 0.0 {
+        if paint.material > 0.0 {
+            let point_mm = paint.material_at;
+            let point_m = point_mm.map(|c| c * 1e-3);
+            let (to_light, irradiance) = self.light.at(point_m);
             let to_camera = normalize([
                 self.camera_at_m[0] - point_m[0],
                 self.camera_at_m[1] - point_m[1],
@@ -299,7 +307,7 @@ impl<'a> Painter<'a> {
             let scale = match self.texture {
                 Some((texture, seed)) => texture.factor(point_mm, seed),
                 None => 1.0,
-            } * material
+            } * paint.material
                 * irradiance;
             let f = self.brdf.eval(to_light, to_camera);
             for c in 0..3 {

@@ -59,15 +59,25 @@ impl Optics {
 
     /// Standard deviation of the pixel's blurred aperture along x and along y of the target, mm.
     pub fn blur_mm(&self, pixel: [f64; 2]) -> [f64; 2] {
-        let p = self.undistorted(pixel);
-        let [x, y, w] = self.homogeneous(p);
-        let m = &self.target_from_pixel;
-        let gradient = |value: f64, row: &Vec3| {
-            let du = (row[0] - value * m[2][0]) / w;
-            let dv = (row[1] - value * m[2][1]) / w;
-            self.sigma_px * (du * du + dv * dv).sqrt()
+        let Some(at) = self.target_point_mm(pixel) else {
+            return [0.0; 2];
         };
-        [gradient(x / w, &m[0]), gradient(y / w, &m[1])]
+        let across = self.blur_across(pixel);
+        [across(0, at[0]), across(1, at[1])]
+    }
+
+    /// Standard deviation of the pixel's blurred aperture across an edge of the target (the coordinate that is
+    /// constant on it, and its value in mm), in mm: the pixel's distance from the edge in mm over it is the
+    /// distance of the edge's image in pixels over the blur, at any perspective.
+    pub fn blur_across(&self, pixel: [f64; 2]) -> impl Fn(usize, f64) -> f64 + use<> {
+        let m = self.target_from_pixel;
+        let w = self.homogeneous(self.undistorted(pixel))[2];
+        let sigma_px = self.sigma_px;
+        move |axis, edge_mm| {
+            let du = (m[axis][0] - edge_mm * m[2][0]) / w;
+            let dv = (m[axis][1] - edge_mm * m[2][1]) / w;
+            sigma_px * (du * du + dv * dv).sqrt()
+        }
     }
 
     /// The largest of [`Self::blur_mm`] within a square of the given half side, mm: it grows with
@@ -148,6 +158,26 @@ mod tests {
                 let back = optics.target_point_mm(pixel).unwrap();
                 assert!((back[0] - point[0]).hypotenuse(back[1] - point[1]) < 1e-6);
             }
+        }
+    }
+
+    #[test]
+    fn an_edge_is_as_many_blurs_away_as_its_image() {
+        let geometry = SceneGeometry::paper(240);
+        let camera = geometry.camera_at(Direction::from_deg(75.0, 25.0));
+        let optics = Optics::new(&geometry, &camera);
+        let image = |y: f64| optics.project([0.335, y * 1e-3, 0.0]).unwrap().0;
+        let ([x0, y0], [x1, y1]) = (image(-300.0), image(300.0));
+        let length = (x1 - x0).hypotenuse(y1 - y0);
+        for pixel in [[150.0, 140.0], [120.0, 150.0], [90.0, 160.0]] {
+            let off_px = ((pixel[0] - x0) * (y1 - y0) - (pixel[1] - y0) * (x1 - x0)) / length;
+            let off_mm = optics.target_point_mm(pixel).unwrap()[0] - 335.0;
+            let blurs = off_mm / optics.blur_across(pixel)(0, 335.0);
+            let expected = off_px / optics.sigma_px;
+            assert!(
+                (blurs.abs() - expected.abs()).abs() < 1e-9,
+                "{blurs} {expected}"
+            );
         }
     }
 

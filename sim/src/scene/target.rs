@@ -15,12 +15,19 @@ const HALF_SQUARE: f64 = 0.886_226_925_452_758;
 /// Beyond this many standard deviations a blurred edge is over.
 const REACH: f64 = 4.0;
 
-/// What a pixel sees of the target.
+/// What a pixel sees of the target. Its aperture sees an edge's surface beside its own centre: light that
+/// differs over the aperture is that of the place that is seen.
 pub struct Paint {
     /// Share of the pixel covered by material, 0 ..= 1.
     pub material: f64,
-    /// Albedo over π of the rest (lines and desk), by share.
-    pub grey: f64,
+    /// Where that material is in the mean, mm.
+    pub material_at: [f64; 2],
+    /// Albedo over π of the lines, by share.
+    pub lines: f64,
+    /// Where they are in the mean, mm.
+    pub lines_at: [f64; 2],
+    /// Albedo over π of the desk, by share.
+    pub desk: f64,
 }
 
 /// The layout of the target.
@@ -48,39 +55,58 @@ impl TargetMap {
         }
     }
 
-    /// The paint in a pixel centred at a point (mm), whose aperture, blurred by the lens, has the
-    /// given standard deviations along x and y (mm; asked for only near an edge). Edges are
+    /// The paint in a pixel centred at a point (mm). `sigma_mm` says how wide its aperture, blurred by the
+    /// lens, is across an edge: of which coordinate the edge is (0 for x), and where (mm). Edges are
     /// integrated exactly along each axis. `None` off the desk.
-    pub fn paint(&self, at: [f64; 2], sigma_mm: impl Fn() -> [f64; 2]) -> Option<Paint> {
+    pub fn paint(&self, at: [f64; 2], sigma_mm: impl Fn(usize, f64) -> f64) -> Option<Paint> {
         let far = at[0].abs().max(at[1].abs());
         if far < self.material_half - self.reach {
             return Some(Paint {
                 material: 1.0,
-                grey: 0.0,
+                material_at: at,
+                lines: 0.0,
+                lines_at: at,
+                desk: 0.0,
             });
         }
         if far > self.desk_half + self.reach {
             return None;
         }
-        let sigma = sigma_mm();
-        let within =
-            |half: f64| band(at[0], 0.0, half, sigma[0]) * band(at[1], 0.0, half, sigma[1]);
-        let line = |axis: usize| band(at[axis].abs(), self.offset, self.half_width, sigma[axis]);
-        let desk = within(self.desk_half);
-        let material = within(self.material_half);
-        let mark = self.mark.map_or(0.0, |mark| disc(mark, at, sigma));
-        let lines = 1.0 - (1.0 - line(0)) * (1.0 - line(1)) * (1.0 - mark);
+        let seen = |axis: usize, ends: [f64; 2]| {
+            band(at[axis], ends, ends.map(|edge| sigma_mm(axis, edge)))
+        };
+        let within = |half: f64| [0, 1].map(|axis| seen(axis, [-half, half]));
+        let share = |[x, y]: [Band; 2]| x.share * y.share;
+        let desk = share(within(self.desk_half));
+        let material_bands = within(self.material_half);
+        let material = share(material_bands);
+        let line = |axis: usize| {
+            let middle = self.offset.copysign(at[axis]);
+            seen(axis, [middle - self.half_width, middle + self.half_width])
+        };
+        let line = [line(0), line(1)];
+        let mark = self.mark.map_or(0.0, |mark| {
+            disc(mark, at, [0, 1].map(|axis| sigma_mm(axis, at[axis])))
+        });
+        let lines = 1.0 - (1.0 - line[0].share) * (1.0 - line[1].share) * (1.0 - mark);
         let rest = (desk - material).max(0.0);
         let lines = (lines * desk).min(rest);
+        // Where two lines cross, or the mark is near, each is seen by its share.
+        let all = (line[0].share + line[1].share + mark).max(1e-30);
+        let of = line.map(|l| l.share / all);
+        let lines_at = [0, 1].map(|axis| at[axis] + of[axis] * (line[axis].mean - at[axis]));
         Some(Paint {
             material,
-            grey: (lines * LINE_ALBEDO + (rest - lines) * DESK_ALBEDO) / PI,
+            material_at: material_bands.map(|band| band.mean),
+            lines: lines * LINE_ALBEDO / PI,
+            lines_at,
+            desk: (rest - lines) * DESK_ALBEDO / PI,
         })
     }
 }
 
-/// Share of a Gaussian at a point that lies within a disc (in any one unit): exact across its edge, where that is long against
-/// the Gaussian, and that of a square of the same area along it.
+/// Share of a Gaussian at a point that lies within a disc (in any one unit): exact across its edge, where that is
+/// long against the Gaussian, and that of a square of the same area along it.
 pub fn disc(mark: OrientationMark, at: [f64; 2], sigma: [f64; 2]) -> f64 {
     let from = [at[0] - mark.at_mm[0], at[1] - mark.at_mm[1]];
     let far = from[0].hypotenuse(from[1]);
@@ -91,19 +117,46 @@ pub fn disc(mark: OrientationMark, at: [f64; 2], sigma: [f64; 2]) -> f64 {
     };
     let across = (out[0] * sigma[0]).hypotenuse(out[1] * sigma[1]);
     let along = (out[1] * sigma[0]).hypotenuse(out[0] * sigma[1]);
-    band(far, 0.0, mark.radius_mm, across) * band(0.0, 0.0, HALF_SQUARE * mark.radius_mm, along)
+    let (radius, side) = (mark.radius_mm, HALF_SQUARE * mark.radius_mm);
+    band(far, [-radius, radius], [across; 2]).share * band(0.0, [-side, side], [along; 2]).share
 }
 
-/// Share of a Gaussian of standard deviation `sigma` at `x` that lies within `half` of `centre`.
-fn band(x: f64, centre: f64, half: f64, sigma: f64) -> f64 {
-    let (low, high) = (x - centre + half, centre + half - x);
-    if low > REACH * sigma && high > REACH * sigma {
-        1.0
-    } else if low < -REACH * sigma || high < -REACH * sigma {
-        0.0
+/// What a Gaussian sees of a band.
+#[derive(Clone, Copy)]
+struct Band {
+    /// The share of the Gaussian that lies within it.
+    share: f64,
+    /// The mean of that share.
+    mean: f64,
+}
+
+/// What a Gaussian at `x` sees of what lies between two ends, from each of which its standard deviation is
+/// given.
+fn band(x: f64, [low, high]: [f64; 2], sigma: [f64; 2]) -> Band {
+    let (below, above) = ((x - low) / sigma[0], (high - x) / sigma[1]);
+    if below > REACH && above > REACH {
+        Band {
+            share: 1.0,
+            mean: x,
+        }
+    } else if below < -REACH || above < -REACH {
+        Band {
+            share: 0.0,
+            mean: x.clamp(low, high),
+        }
     } else {
-        (normal_cdf(high / sigma) + normal_cdf(low / sigma) - 1.0).max(0.0)
+        let share = (normal_cdf(above) + normal_cdf(below) - 1.0).max(0.0);
+        let by = (sigma[0] * density(below) - sigma[1] * density(above)) / share.max(1e-9);
+        Band {
+            share,
+            mean: (x + by).clamp(low, high),
+        }
     }
+}
+
+/// The density of the normal distribution.
+fn density(x: f64) -> f64 {
+    (-0.5 * x * x).exponential() / (2.0 * PI).sqrt()
 }
 
 /// The normal distribution function to 1e-7 (Abramowitz & Stegun 7.1.26).
@@ -153,14 +206,14 @@ mod tests {
     #[test]
     fn shares_follow_the_layout() {
         let map = TargetMap::new(&SceneGeometry::paper(400), 0.5);
-        let at = |x, y| map.paint([x, y], || [0.5, 0.5]);
+        let at = |x, y| map.paint([x, y], |_, _| 0.5);
         assert_eq!(at(0.0, 0.0).unwrap().material, 1.0);
         assert!((at(320.0, 0.0).unwrap().material - 0.5).abs() < 1e-6);
-        assert!((at(335.0, 0.0).unwrap().grey * PI - LINE_ALBEDO).abs() < 1e-3);
-        assert!((at(0.0, -335.0).unwrap().grey * PI - LINE_ALBEDO).abs() < 1e-3);
-        assert!((at(328.0, 0.0).unwrap().grey * PI - DESK_ALBEDO).abs() < 1e-6);
+        assert!((at(335.0, 0.0).unwrap().lines * PI - LINE_ALBEDO).abs() < 1e-3);
+        assert!((at(0.0, -335.0).unwrap().lines * PI - LINE_ALBEDO).abs() < 1e-3);
+        assert!((at(328.0, 0.0).unwrap().desk * PI - DESK_ALBEDO).abs() < 1e-6);
         // The lines go on to the edge of the desk.
-        assert!((at(390.0, 335.0).unwrap().grey * PI - LINE_ALBEDO).abs() < 1e-3);
+        assert!((at(390.0, 335.0).unwrap().lines * PI - LINE_ALBEDO).abs() < 1e-3);
         assert!(at(410.0, 0.0).is_none());
         let geometry = SceneGeometry {
             mark: Some(OrientationMark {
@@ -170,11 +223,28 @@ mod tests {
             ..SceneGeometry::paper(400)
         };
         let map = TargetMap::new(&geometry, 0.5);
-        let grey = |x, y| map.paint([x, y], || [0.5, 0.5]).unwrap().grey * PI;
+        let grey = |x, y| {
+            let paint = map.paint([x, y], |_, _| 0.5).unwrap();
+            (paint.lines + paint.desk) * PI
+        };
         assert!((grey(365.0, 129.0) - LINE_ALBEDO).abs() < 1e-3);
         assert!((grey(365.0, 132.0) - 0.5 * (LINE_ALBEDO + DESK_ALBEDO)).abs() < 1e-3);
         assert!((grey(365.0, 135.0) - DESK_ALBEDO).abs() < 1e-3);
         assert!((grey(365.0, -120.0) - DESK_ALBEDO).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_pixel_beside_an_edge_sees_what_lies_behind_it() {
+        let map = TargetMap::new(&SceneGeometry::paper(400), 3.0);
+        let at = |x, y| map.paint([x, y], |_, _| 3.0).unwrap();
+        // Half of a Gaussian has its mean at σ √(2/π).
+        let half = at(-320.0, 7.0);
+        let expected = -320.0 + 3.0 * (2.0 / PI).sqrt();
+        assert!((half.material_at[0] - expected).abs() < 1e-4);
+        assert_eq!(half.material_at[1], 7.0);
+        // Five millimetres outwards of a line all that is seen of it is within it, nearer to its outer edge.
+        let beside = at(20.0, -340.0).lines_at;
+        assert!(beside[0] == 20.0 && beside[1] < -335.0 && beside[1] > -337.0);
     }
 
     #[test]

@@ -63,7 +63,7 @@ impl Registrar {
         for ((side, strip), line) in SIDES.iter().zip(&strips).zip(&fit.lines) {
             let Some(line) = line else { continue };
             let floor = self.line_variance(strip);
-            for piece in pieces(strip, line.line, fit.sigma_px, &self.target, PIECES) {
+            for piece in pieces(strip, line.line, fit.sigma_px, PIECES) {
                 points.push(LinePoint {
                     axis: side.axis,
                     sign: side.sign,

@@ -2,7 +2,7 @@
 
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::mirror::{self, MirrorLight};
-use crate::calibrate::numbers::LightSolution;
+use crate::calibrate::numbers::{LightSolution, allow_for_kept};
 use crate::calibrate::residuals::ShadingResidual;
 use crate::calibrate::shading::{
     LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, MirrorTerm, OWN, ReferenceShape, ShadedFrame,
@@ -19,8 +19,15 @@ const FEWEST: usize = 6;
 /// Standard deviation of a frame's level, or of values within a frame, beyond which a reference does not
 /// scatter as it is thought to (relative).
 const NOT_AS_THOUGHT: f64 = 0.02;
-/// A light that shading draws so many standard deviations from the mirror's contradicts it.
-const CONTRADICTS: f64 = 4.0;
+        if let Some(unlike) = unlike(&all, typical) {
+            return known.by_mirror_or(rig, unlike);
+        }
+        let mut covariance = joined(known.camera, &all.information, &prior)?;
+        let (light, own) = (LIGHT.len(), own_of(&covariance));
+        let (was, likely) = (&nominal[..light], &prior[..light]);
+        let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
+        let at = CAMERA.len();
+        allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
 /// Values within a frame may differ by so many times their noise, however large that is.
 const NOISES: f64 = 3.0;
 
@@ -78,7 +85,7 @@ impl Known<'_> {
         };
         let (nominal, prior) = (values(&LIGHT, rig), priors(&LIGHT, rig));
         let solution = mirror.alone(self.camera, |shared, own| {
-            states(&LIGHT, &nominal, &prior, shared, own)
+            states(&LIGHT, rig, &nominal, &prior, shared, own)
         })?;
         Ok(Light {
             state: LightState::FoundByMirror {
@@ -153,6 +160,23 @@ impl Light {
         let (light, own) = (LIGHT.len(), own_of(&covariance));
         let (was, likely) = (&nominal[..light], &prior[..light]);
         let states = states(&LIGHT, was, likely, &all.shared, &own);
+}
+
+        if let Some(unlike) = unlike(&all, typical) {
+            return Ok(Self::left(unlike));
+        }
+        let mut covariance = joined(camera, &all.information, &prior)?;
+        let (at, light) = (CAMERA.len(), LIGHT.len());
+        let own = covariance.view((at, at), (light, light)).into_owned();
+        let states = states(
+            &LIGHT,
+            rig,
+            &nominal[..light],
+            &prior[..light],
+            &all.shared,
+            &own,
+        );
+        allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
         let kept = free(&are_free(&states), prior.len());
         let solved = solve_light(
             &shading,
@@ -242,6 +266,13 @@ fn residuals_of(shading: &Shading<'_>, before: &Solved, after: &Solved) -> Vec<S
     shading.frames.iter().map(of_frame).collect()
 }
 
+/// What a reference shows that does not scatter as it is thought to, where its values have a `typical` noise.
+fn unlike(solved: &Solved, typical: f64) -> Option<LightState> {
+    let (level, within) = (solved.own[2], solved.noise * typical);
+    let is_unlike = level > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical);
+    is_unlike.then_some(LightState::ReferenceUnlike { level, within })
+}
+
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.
 fn nominal(rig: &Rig, level: f64, reference: ReferenceShape) -> Vec<f64> {
     let mut nominal = values(&LIGHT, rig);
@@ -282,6 +313,7 @@ fn solve_light(
         free,
         own: own.unwrap_or(&OWN),
         least_own: &LEAST_OWN,
+        least_noise: LEAST_FACTOR,
         finds_noise: own.is_none(),
     };
     let start = started(nominal, free, start);

@@ -7,7 +7,7 @@
 
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::lines::{LineFrame, arm_offset};
-use crate::calibrate::numbers::{LightSolution, NumberState};
+use crate::calibrate::numbers::{LightSolution, NumberState, allow_for_kept};
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, values, with_values};
 use crate::calibrate::{are_free, covariance_of, priors, started};
@@ -157,10 +157,12 @@ impl<'a> MirrorLight<'a> {
         camera: &DMatrix<f64>,
         states: impl FnOnce(&[f64], &DMatrix<f64>) -> Vec<NumberState>,
     ) -> Result<LightSolution, CalibrateError> {
-        let covariance = joined(&self.solved.information, &self.prior, camera)?;
+        let mut covariance = joined(&self.solved.information, &self.prior, camera)?;
         let (n, l) = (CAMERA.len(), LIGHT.len());
         let own = covariance.view((n, n), (l, l)).into_owned();
-        let states = states(&self.solved.shared[..l], &own);
+        let (was, found) = (&self.nominal[..l], &self.solved.shared[..l]);
+        let states = states(found, &own);
+        allow_for_kept(&mut covariance, n, &states, was, found);
         let free = are_free(&states[..PLACE]);
         let priors = (&self.nominal[..], &self.prior[..]);
         let start = started(&self.nominal, &all_free(&free), Some(&self.solved));

@@ -44,7 +44,7 @@ use light::{Known, Light};
 use lines::{LineFrame, Lines, misfit_px};
 use mirror::{MirrorFrame, MirrorLight};
 use nalgebra::DMatrix;
-use numbers::{changes, direction_u, state_of};
+use numbers::{allow_for_kept, changes, direction_u, state_of};
 use rayon::prelude::*;
 use shading::ShadedFrame;
 use solve::{Problem, Solved, solve};
@@ -386,6 +386,7 @@ fn solve_camera(
             Own::Usual | Own::Unknown => &lines::OWN,
         },
         least_own: &lines::LEAST_OWN,
+        least_noise: lines::LEAST_NOISE,
         finds_noise: matches!(own, Own::Unknown),
     };
     let start = started(&nominal, &free, start);
@@ -431,6 +432,7 @@ fn covariance_of(
 /// Which numbers may move once all have, and why the others may not.
 fn states(
     unknowns: &[Unknown],
+    rig: &Rig,
     nominal: &[f64],
     prior: &[f64],
     found: &[f64],
@@ -439,7 +441,7 @@ fn states(
     (0..unknowns.len())
         .map(|k| {
             let u = covariance[(k, k)].sqrt();
-            state_of(&unknowns[k], nominal[k], prior[k], found[k], u)
+            state_of(&unknowns[k], rig, nominal[k], prior[k], found[k], u)
         })
         .collect()
 }
@@ -526,11 +528,12 @@ fn find_camera(
     let every = [true; CAMERA.len()];
     let all = solve_camera(rig, lines, &every, Own::Unknown, Some(&first))?;
     let covariance = covariance_of(&all.information, &camera_priors(rig))?;
-    let covariance = covariance
+    let mut covariance = covariance
         .view((0, 0), (CAMERA.len(), CAMERA.len()))
         .into_owned();
     let (nominal, prior) = (values(&CAMERA, rig), priors(&CAMERA, rig));
-    let states = states(&CAMERA, &nominal, &prior, &all.shared, &covariance);
+    let states = states(&CAMERA, rig, &nominal, &prior, &all.shared, &covariance);
+    allow_for_kept(&mut covariance, 0, &states, &nominal, &all.shared);
     let own = Own::Found(&all.own);
     let kept = solve_camera(rig, lines, &are_free(&states), own, Some(&all))?;
     Ok(CameraSolution {

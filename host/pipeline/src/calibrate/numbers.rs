@@ -57,7 +57,14 @@ impl Number {
 }
 
 /// What becomes of a number that was free to move to `value` with uncertainty `u`.
-pub fn state_of(unknown: &Unknown, nominal: f64, prior: f64, value: f64, u: f64) -> NumberState {
+pub fn state_of(
+    unknown: &Unknown,
+    rig: &Rig,
+    nominal: f64,
+    prior: f64,
+    value: f64,
+    u: f64,
+) -> NumberState {
     if u > DETERMINED * prior {
         return NumberState::Undetermined;
     }
@@ -66,8 +73,26 @@ pub fn state_of(unknown: &Unknown, nominal: f64, prior: f64, value: f64, u: f64)
     let speaks =
         ((value - nominal) / u).powi(2) - 2.0 * gonia_brdf::Elementary::natural_log(prior / u);
     match unknown.moves {
-        Moves::WhenNeeded if speaks < 0.0 => NumberState::NotNeeded,
+        Moves::WhenNeeded(least) if speaks < 0.0 || (value - nominal).abs() < least(rig) => {
+            NumberState::NotNeeded
+        }
         _ => NumberState::Found,
+    }
+}
+
+/// Numbers that were free to move and are kept at the rig's value, although the frames do not need that: to their
+/// variances comes how far off the frames see them. `first` is the row of the first number in `covariance`.
+pub fn allow_for_kept(
+    covariance: &mut DMatrix<f64>,
+    first: usize,
+    states: &[NumberState],
+    nominal: &[f64],
+    found: &[f64],
+) {
+    for (k, state) in states.iter().enumerate() {
+        if *state == NumberState::NotNeeded {
+            covariance[(first + k, first + k)] += (found[k] - nominal[k]).powi(2);
+        }
     }
 }
 

@@ -60,7 +60,7 @@ pub fn of_lines(before: &Rig, after: &Rig, frames: &[LineFrame]) -> Vec<LineResi
             residuals.push(LineResidual {
                 pixel: point.pixel,
                 outward: normal.map(|c| c * side.signum()),
-                px: [off[0][i], off[1][i]],
+                px: [off[0][i][0], off[1][i][0]],
             });
         }
         residuals

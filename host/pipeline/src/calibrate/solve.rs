@@ -50,6 +50,8 @@ pub struct Problem<'a> {
     pub own: &'a [f64],
     /// The least that they are taken to be: few frames seem to have none.
     pub least_own: &'a [f64],
+    /// The least that the residuals' common factor is taken to be.
+    pub least_noise: f64,
     /// Whether noise and frames' own standard deviations are found too.
     pub finds_noise: bool,
 }
@@ -84,7 +86,7 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
     let mut shared = start.to_vec();
     let mut own_sd = problem.own.to_vec();
     let mut own = vec![vec![0.0; own_sd.len()]; frames.count()];
-    let mut noise = noise_of(frames, &shared, &own)?;
+    let mut noise = noise_of(frames, &shared, &own)?.max(problem.least_noise);
     let free: Vec<usize> = (0..n).filter(|k| problem.free[*k]).collect();
     for round in 0..ROUNDS {
         let reduced = linearise(frames, problem, &shared, &own, &own_sd, noise);
@@ -111,7 +113,7 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
                 *value += change * sd;
             }
         }
-        noise = noise_of(frames, &shared, &own)?;
+        noise = noise_of(frames, &shared, &own)?.max(problem.least_noise);
         let had = own_sd.clone();
         if problem.finds_noise && round >= BEFORE_NOISE {
             for (j, sd) in own_sd.iter_mut().enumerate() {
@@ -159,7 +161,7 @@ fn noise_of<F: Frames>(frames: &F, shared: &[f64], own: &[Vec<f64>]) -> Option<f
     all.iter_mut().for_each(|r| *r = r.abs());
     let middle = all.len() / 2;
     let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
-    median.is_finite().then_some((1.4826 * median).max(1e-6))
+    median.is_finite().then_some(1.4826 * median)
 }
 
 /// Every frame's normal equations in units of the priors.
@@ -297,6 +299,7 @@ mod tests {
                 free: &[true, true],
                 own: &[0.1],
                 least_own: &[1e-3],
+                least_noise: 1e-6,
                 finds_noise: true,
             };
             let solved = solve(&Lines { seen }, &problem, &[0.0, 0.0]).unwrap();

@@ -15,12 +15,13 @@ pub struct Unknown {
 }
 
 /// When a number leaves the rig's value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Moves {
     /// As soon as the frames determine it. No rig is built as it was drawn.
     WhenDetermined,
-    /// Only when the frames speak for it (Bayes factor above 1): most lenses and lamps have none.
-    WhenNeeded,
+    /// Only when the frames speak for it (Bayes factor above 1), and only where it is larger than this, about
+    /// the rig's value: less is what lines and shading are not trusted to. Most lenses and lamps have none.
+    WhenNeeded(fn(&Rig) -> f64),
 }
 
 use Moves::{WhenDetermined, WhenNeeded};
@@ -44,6 +45,25 @@ fn of_camera(rig: &Rig, share: f64) -> f64 {
     1000.0 * share * rig.camera.distance_m
 }
 
+/// A lens term that moves no fiducial line by more than this, pixels, is none: what the model of their
+/// brightness leaves is as large where lines are crowded by the material, and repeats from frame to frame.
+const LENS_PX: f64 = 0.02;
+/// A beam that changes the irradiance at the edge of the material by less than this share is none.
+const BEAM: f64 = 1e-3;
+
+/// The coefficient of a lens term that grows with this power of r and moves the end of a fiducial line, where it
+/// crosses its neighbour straight from above, by [`LENS_PX`].
+fn lens(rig: &Rig, power: i32) -> f64 {
+    let r = std::f64::consts::SQRT_2 * 1e-3 * rig.target.line_offset_mm / rig.camera.distance_m;
+    LENS_PX / (rig.camera.focal_px * r.powi(power))
+}
+
+/// The coefficient of a term of the beam that grows with this power of the tangent.
+fn beam(rig: &Rig, power: i32) -> f64 {
+    let tangent = 1e-3 * rig.target.material_half_mm / rig.light.distance_m;
+    BEAM / tangent.powi(power)
+}
+
 /// The number of the target's place among [`CAMERA`]'s; they are its last ones.
 pub const TARGET: usize = 5;
 
@@ -54,10 +74,10 @@ pub const CAMERA: [Unknown; 21] = [
     unknown("camera.focal_px", WhenDetermined, |r| 0.03 * r.camera.focal_px, |r| &mut r.camera.focal_px),
     unknown("camera.centre_px[0]", WhenDetermined, |r| 0.02 * r.camera.width_px as f64, |r| &mut r.camera.centre_px[0]),
     unknown("camera.centre_px[1]", WhenDetermined, |r| 0.02 * r.camera.width_px as f64, |r| &mut r.camera.centre_px[1]),
-    unknown("camera.k1", WhenNeeded, |_| 0.1, |r| &mut r.camera.k1),
-    unknown("camera.k2", WhenNeeded, |_| 0.2, |r| &mut r.camera.k2),
-    unknown("camera.p1", WhenNeeded, |_| 0.005, |r| &mut r.camera.p1),
-    unknown("camera.p2", WhenNeeded, |_| 0.005, |r| &mut r.camera.p2),
+    unknown("camera.k1", WhenNeeded(|r| lens(r, 3)), |_| 0.1, |r| &mut r.camera.k1),
+    unknown("camera.k2", WhenNeeded(|r| lens(r, 5)), |_| 0.2, |r| &mut r.camera.k2),
+    unknown("camera.p1", WhenNeeded(|r| lens(r, 2)), |_| 0.005, |r| &mut r.camera.p1),
+    unknown("camera.p2", WhenNeeded(|r| lens(r, 2)), |_| 0.005, |r| &mut r.camera.p2),
     unknown("camera.distance_m", WhenDetermined, |r| 0.03 * r.camera.distance_m, |r| &mut r.camera.distance_m),
     unknown("camera.mount.roll_deg", WhenDetermined, |_| 3.0, |r| &mut r.camera.mount.roll_deg),
     unknown("camera.mount.aim_mm[0]", WhenDetermined, |r| of_camera(r, 0.015), |r| &mut r.camera.mount.aim_mm[0]),
@@ -83,11 +103,11 @@ pub const LIGHT: [Unknown; 11] = [
     unknown("light.arm.axis_miss_mm", WhenDetermined, |r| 3.0 * r.light.distance_m, |r| &mut r.light.arm.axis_miss_mm),
     unknown("light.arm.axis_square_deg", WhenDetermined, |_| 0.2, |r| &mut r.light.arm.axis_square_deg),
     unknown("light.arm.right_mm", WhenDetermined, |r| 10.0 * r.light.distance_m, |r| &mut r.light.arm.right_mm),
-    unknown("light.beam[0]", WhenNeeded, |_| 0.3, |r| &mut r.light.beam[0]),
-    unknown("light.beam[1]", WhenNeeded, |_| 0.3, |r| &mut r.light.beam[1]),
-    unknown("light.beam[2]", WhenNeeded, |_| 3.0, |r| &mut r.light.beam[2]),
-    unknown("light.beam[3]", WhenNeeded, |_| 3.0, |r| &mut r.light.beam[3]),
-    unknown("light.beam[4]", WhenNeeded, |_| 3.0, |r| &mut r.light.beam[4]),
+    unknown("light.beam[0]", WhenNeeded(|r| beam(r, 1)), |_| 0.3, |r| &mut r.light.beam[0]),
+    unknown("light.beam[1]", WhenNeeded(|r| beam(r, 1)), |_| 0.3, |r| &mut r.light.beam[1]),
+    unknown("light.beam[2]", WhenNeeded(|r| beam(r, 2)), |_| 3.0, |r| &mut r.light.beam[2]),
+    unknown("light.beam[3]", WhenNeeded(|r| beam(r, 2)), |_| 3.0, |r| &mut r.light.beam[3]),
+    unknown("light.beam[4]", WhenNeeded(|r| beam(r, 2)), |_| 3.0, |r| &mut r.light.beam[4]),
 ];
 
 /// The numbers of a rig.
