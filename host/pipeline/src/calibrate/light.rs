@@ -19,15 +19,10 @@ const FEWEST: usize = 6;
 /// Standard deviation of a frame's level, or of values within a frame, beyond which a reference does not
 /// scatter as it is thought to (relative).
 const NOT_AS_THOUGHT: f64 = 0.02;
-        if let Some(unlike) = unlike(&all, typical) {
-            return known.by_mirror_or(rig, unlike);
-        }
-        let mut covariance = joined(known.camera, &all.information, &prior)?;
-        let (light, own) = (LIGHT.len(), own_of(&covariance));
-        let (was, likely) = (&nominal[..light], &prior[..light]);
-        let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
-        let at = CAMERA.len();
-        allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
+/// A light that shading draws so many standard deviations from the mirror's contradicts it.
+const CONTRADICTS: f64 = 4.0;
+/// A frame's noise is seen in itself; the residuals' factor is found, and only zero makes no sense.
+const LEAST_FACTOR: f64 = 1e-6;
 /// Values within a frame may differ by so many times their noise, however large that is.
 const NOISES: f64 = 3.0;
 
@@ -151,31 +146,14 @@ impl Light {
             &everything,
             (None, Some(&first)),
         )?;
-        let within = all.noise * typical;
-        if all.own[2] > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical) {
-            let level = all.own[2];
-            return known.by_mirror_or(rig, LightState::ReferenceUnlike { level, within });
+        if let Some(unlike) = unlike(&all, typical) {
+            return known.by_mirror_or(rig, unlike);
         }
-        let covariance = joined(known.camera, &all.information, &prior)?;
+        let mut covariance = joined(known.camera, &all.information, &prior)?;
         let (light, own) = (LIGHT.len(), own_of(&covariance));
         let (was, likely) = (&nominal[..light], &prior[..light]);
-        let states = states(&LIGHT, was, likely, &all.shared, &own);
-}
-
-        if let Some(unlike) = unlike(&all, typical) {
-            return Ok(Self::left(unlike));
-        }
-        let mut covariance = joined(camera, &all.information, &prior)?;
-        let (at, light) = (CAMERA.len(), LIGHT.len());
-        let own = covariance.view((at, at), (light, light)).into_owned();
-        let states = states(
-            &LIGHT,
-            rig,
-            &nominal[..light],
-            &prior[..light],
-            &all.shared,
-            &own,
-        );
+        let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
+        let at = CAMERA.len();
         allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
         let kept = free(&are_free(&states), prior.len());
         let solved = solve_light(

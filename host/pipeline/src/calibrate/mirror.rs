@@ -284,6 +284,7 @@ impl Mirrors<'_> {
             free: &all_free(place),
             own: &[],
             least_own: &[],
+            least_noise: 1e-6,
             finds_noise: false,
         };
         let mut solved = solve(self, &problem, start).ok_or(CalibrateError::NoSolution)?;
