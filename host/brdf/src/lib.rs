@@ -64,4 +64,4 @@ pub use elementary::Elementary;
 pub use grid::Grid;
 pub use model::Brdf;
 pub use sample::Sample;
-pub use symmetry::Symmetry;
+pub use symmetry::{MirrorPlane, Symmetry, SymmetryKind};

@@ -49,7 +49,7 @@ pub struct Fill {
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,
     /// The material's symmetry about its normal: auto (what few samples show, or leave to be assumed),
-    /// none, isotropic or half-turn
+    /// none, isotropic, bilateral, half-turn or half-turn-bilateral
     #[arg(long, value_enum, default_value = "auto")]
     symmetry: SymmetryArgument,
     /// default, or a method that works cell by cell: paper, nearest, shepard, mls1, mls2,

@@ -7,10 +7,10 @@ use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{
     self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillError, FillSettings,
-    IsotropicOrigins, Matern32, OriginCounts, Preset,
+    IsotropicOrigins, Kernel, Matern32, OriginCounts, Preset,
 };
-use gonia_brdf::scattered::{Reason, ScatteredFit, is_few};
-use gonia_brdf::{Bin, Bins, DenseBrdf, Direction, Grid, Sample, Symmetry};
+use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit, is_few};
+use gonia_brdf::{Bin, Bins, DenseBrdf, Direction, Grid, Sample, Symmetry, SymmetryKind};
 use gonia_formats::dense::write_dense_by_rows;
 use gonia_rig::{DenseFile, Remark, SampleSet, keep_sound};
 use std::path::Path;
@@ -38,7 +38,7 @@ pub struct FillOptions {
     pub with_errors: bool,
     /// The symmetry of the material about its normal; without it, what few samples show or leave to be assumed,
     /// and none of many.
-    pub symmetry: Option<Symmetry>,
+    pub symmetry: Option<SymmetryKind>,
 }
 
 impl Default for FillOptions {
@@ -168,7 +168,7 @@ impl FillOptions {
             "not on a grid of {} degrees, which is filled row by row; leave it out",
             self.step_deg
         );
-        if self.symmetry.is_some_and(Symmetry::is_isotropic) && grid.n_cells() > CELLS_IN_MEMORY {
+        if self.symmetry == Some(SymmetryKind::Isotropic) && grid.n_cells() > CELLS_IN_MEMORY {
             return refuse("--symmetry", "isotropic".into(), by_rows);
         }
         let is_blocks = self.method == FillMethod::Blocks;
@@ -179,7 +179,7 @@ impl FillOptions {
                 "only the default method has error bars; leave out one of them".into(),
             );
         }
-        if self.symmetry.is_some_and(|s| s != Symmetry::None) && !is_blocks {
+        if self.symmetry.is_some_and(|kind| kind != SymmetryKind::None) && !is_blocks {
             return refuse(
                 "--symmetry",
                 "with --method".into(),
@@ -193,6 +193,14 @@ impl FillOptions {
             return refuse("--method", self.step_deg.to_string(), by_rows);
         }
         Ok(())
+    }
+
+    /// Whether something is asked for that only blocks have: few anisotropic samples are filled by them then.
+    fn asks_for_blocks(&self) -> bool {
+        self.block_deg.is_some()
+            || self.nodes.is_some()
+            || self.tolerance.is_some()
+            || self.kernel.name() != Matern32.name()
     }
 
     /// Whether the grid fits memory: [`fill`] makes it then, and [`fill_to_file`] otherwise.
@@ -273,14 +281,14 @@ pub fn fill(
     let (grid, base) = options.check()?;
     let scale = samples.scale;
     let binned = Binned::new(samples, grid, options, progress)?;
-    let (brdf, errors, settings, counts) = match (options.method, &binned.isotropic) {
+    let (brdf, errors, settings, counts) = match (options.method, &binned.fit) {
         (FillMethod::Blocks, Some(fit)) => {
             let (dense, errors) = step(progress, Step::Interpolating, |_| {
                 Ok::<_, Error>(fit.dense(grid, options.with_errors))
             })?;
             let errors = errors.map(|standard_error| ErrorBars {
                 standard_error,
-                origin: binned.isotropic_origins(fit).of_cells(),
+                origin: Origins::of(&binned.bins, fit).of_cells(),
             });
             (
                 dense,
@@ -441,8 +449,8 @@ struct Binned {
     samples: usize,
     /// How many of a sample are in the bins: with its images.
     images: usize,
-    /// The fit, where the material is isotropic: it takes the place of the bins.
-    isotropic: Option<ScatteredFit>,
+    /// The fit of few samples, or of those of an isotropic material: it takes the place of the bins.
+    fit: Option<ScatteredFit>,
     /// The symmetry, for people and for the provenance.
     symmetry: String,
     origins: OriginCounts,
@@ -461,56 +469,56 @@ impl Binned {
         let samples = samples.samples;
         let mut remarks = doubts::of_oddities(&odd);
         remarks.extend(doubts::of_samples(&samples)?);
-        let fit = symmetric_fit(&samples, grid, options, progress)?;
+        let fit = scattered_fit(&samples, grid, options, progress)?;
         let (symmetry, reason) = match (&fit, options.symmetry) {
             (Some(fit), _) => (fit.choice().settings.symmetry, fit.choice().reason),
-            (None, Some(asked)) => (asked, Reason::Asked),
+            (None, Some(asked)) => {
+                let (symmetry, said) = symmetry_of_many(&samples, asked);
+                remarks.extend(said);
+                (symmetry, Reason::Asked)
+            }
             (None, None) => (Symmetry::None, Reason::Untested),
         };
-        let isotropic = fit.filter(|fit| {
-            let is_isotropic = symmetry.is_isotropic();
-            if is_isotropic || fit.choice().contradicted_by.is_some() {
+        let fit = fit.filter(|fit| {
+            let is_few = fit.places() <= FEW_ANISOTROPIC && !options.asks_for_blocks();
+            let takes_place = symmetry.is_isotropic() || is_few;
+            if takes_place || fit.choice().contradicted_by.is_some() {
                 remarks.extend(doubts::remarks_on_symmetry(fit));
             }
-            is_isotropic
+            takes_place
         });
         let bins = step(progress, Step::Binning, |_| {
             Ok::<_, Error>(Bins::new(grid, &samples))
         })?;
         remarks.extend(doubts::of_bins(&samples, &bins));
-        let isotropy = match (&isotropic, reason) {
-            (None, _) => Isotropy::No,
+        let isotropy = match (symmetry.is_isotropic(), reason) {
+            (false, _) => Isotropy::No,
             (_, Reason::Asked) => Isotropy::Asked,
             (_, Reason::Assumed) => Isotropy::Assumed,
             _ => Isotropy::Shown,
         };
-        let images = if symmetry == Symmetry::HalfTurn { 2 } else { 1 };
+        let images = symmetry.order();
         let bins = if images > 1 {
             Bins::new(grid, &symmetry.completed(samples.clone()))
         } else {
             bins
         };
+        let origins = match &fit {
+            Some(fit) => Origins::of(&bins, fit).counts(),
+            None => OriginCounts::of(&bins),
+        };
         let mut binned = Self {
-            origins: OriginCounts::of(&bins),
             bins,
             samples: count,
             images,
-            isotropic: None,
+            fit,
             symmetry: format!("{symmetry}, {reason}"),
+            origins,
             remarks,
         };
-        if let Some(fit) = isotropic {
-            binned.origins = binned.isotropic_origins(&fit).counts();
-            binned.isotropic = Some(fit);
-        }
         let layout = doubts::remark_on_layout(&samples, &binned.origins, isotropy);
         binned.remarks.extend(layout);
         Ok(binned)
-    }
-
-    fn isotropic_origins(&self, fit: &ScatteredFit) -> IsotropicOrigins {
-        let sides_alike = fit.choice().settings.symmetry == Symmetry::Isotropic;
-        IsotropicOrigins::of(&self.bins, sides_alike)
     }
 
     /// The largest polar angle of light, or by reciprocity of view, that was measured.
@@ -537,9 +545,38 @@ impl Binned {
     }
 }
 
-/// A fit of few samples, or of those of a material that is said to be isotropic; `None` where nothing is to be
-/// found out, or there is too little to fit.
-fn symmetric_fit(
+/// Where the cells of a fit have their values from.
+enum Origins<'a> {
+    Isotropic(IsotropicOrigins),
+    Anisotropic(&'a Bins),
+}
+
+impl<'a> Origins<'a> {
+    fn of(bins: &'a Bins, fit: &ScatteredFit) -> Self {
+        match fit.choice().settings.symmetry {
+            Symmetry::Isotropic => Origins::Isotropic(IsotropicOrigins::of(bins, true)),
+            Symmetry::Turns => Origins::Isotropic(IsotropicOrigins::of(bins, false)),
+            _ => Origins::Anisotropic(bins),
+        }
+    }
+
+    fn counts(&self) -> OriginCounts {
+        match self {
+            Origins::Isotropic(origins) => origins.counts(),
+            Origins::Anisotropic(bins) => OriginCounts::of(bins),
+        }
+    }
+
+    fn of_cells(&self) -> Vec<u8> {
+        match self {
+            Origins::Isotropic(origins) => origins.of_cells(),
+            Origins::Anisotropic(bins) => interpolate::origins(bins),
+        }
+    }
+}
+
+/// A fit of few samples, or of those of a material that is said to be isotropic; `None` of others.
+fn scattered_fit(
     samples: &[Sample],
     grid: Grid,
     options: &FillOptions,
@@ -547,18 +584,38 @@ fn symmetric_fit(
 ) -> Result<Option<ScatteredFit>, Error> {
     let asked = options.symmetry;
     let possible = options.method == FillMethod::Blocks && grid.n_cells() <= CELLS_IN_MEMORY;
-    if !possible || asked == Some(Symmetry::None) {
+    if !possible {
         return Ok(None);
     }
     step(progress, Step::ChoosingSettings, |_| {
         Ok(if is_few(samples) {
             ScatteredFit::new(samples, asked)
-        } else if asked.is_some_and(Symmetry::is_isotropic) {
+        } else if asked == Some(SymmetryKind::Isotropic) {
             ScatteredFit::new(&few_of(samples, grid), asked)
         } else {
             None
         })
     })
+}
+
+/// So many of many samples, at most, are looked at for a plane of symmetry, and for what contradicts it.
+const LOOKED_AT: usize = 6000;
+
+/// The symmetry of many samples that is asked for, with the plane that some of them show, and what these say against
+/// it.
+fn symmetry_of_many(samples: &[Sample], asked: SymmetryKind) -> (Symmetry, Vec<Remark>) {
+    if matches!(asked, SymmetryKind::None | SymmetryKind::Isotropic) {
+        return (Symmetry::None, Vec::new());
+    }
+    let step = samples.len().div_ceil(LOOKED_AT).max(1);
+    let some: Vec<Sample> = samples.iter().step_by(step).copied().collect();
+    match ScatteredFit::new(&some, Some(asked)) {
+        Some(fit) => (
+            fit.choice().settings.symmetry,
+            doubts::remarks_on_symmetry(&fit),
+        ),
+        None => (Symmetry::None, Vec::new()),
+    }
 }
 
 /// More samples than this are not asked without a grid.
@@ -570,7 +627,7 @@ const SAMPLES_AT_MOST: usize = 1_000_000;
 /// Samples that contradict what they are taken for, or too few or too many of them.
 pub fn fit_of_samples(
     mut samples: Vec<Sample>,
-    symmetry: Option<Symmetry>,
+    symmetry: Option<SymmetryKind>,
 ) -> Result<(ScatteredFit, Vec<Remark>), Error> {
     let odd = keep_sound(&mut samples);
     let mut remarks = doubts::of_oddities(&odd);

@@ -5,7 +5,7 @@ use gonia_brdf::Elementary;
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::model::{Brdf, Material};
 use gonia_brdf::random::Random;
-use gonia_brdf::{Direction, Grid, Sample, Symmetry};
+use gonia_brdf::{Direction, Grid, Sample, SymmetryKind};
 use gonia_pipeline::{Error, FillOptions, fill, silent};
 use gonia_rig::{SampleSet, Scale};
 
@@ -350,7 +350,7 @@ fn one_azimuth_is_assumed_to_be_isotropic_and_the_result_says_so() {
     assert!(filled.origins.extrapolated < n / 2);
 
     let none = FillOptions {
-        symmetry: Some(Symmetry::None),
+        symmetry: Some(SymmetryKind::None),
         ..FillOptions::with_step_deg(30.0)
     };
     let filled = fill(set(samples), &none, &silent).unwrap();
@@ -367,7 +367,7 @@ fn a_symmetry_that_samples_contradict_is_remarked_on_and_one_that_they_show_is_n
     for (share, contradicted) in [(0.0, false), (0.1, true)] {
         let samples = with_highlight(Layout::Scattered(600), share);
         let (fit, remarks) =
-            gonia_pipeline::fit_of_samples(samples, Some(Symmetry::Isotropic)).unwrap();
+            gonia_pipeline::fit_of_samples(samples, Some(SymmetryKind::Isotropic)).unwrap();
         assert!(fit.choice().settings.symmetry.is_isotropic());
         let said: Vec<String> = remarks.iter().map(ToString::to_string).collect();
         let found = said.iter().any(|s| s.contains("contradict the symmetry"));

@@ -1,25 +1,28 @@
 //! Which settings data bear: by cross-validation, and by what the data can contradict.
 
-use super::data::Datum;
-use super::local::Predicted;
+use super::data::{Data, Datum};
+use super::local::{Local, Predicted};
+use super::merge::{Merged, Without};
+use super::mirror::mirror_plane;
 use super::places::{Near, Places, exchanged};
-use super::{NEIGHBOURS_MOST, ScatteredKernel, Settings, predict_from, preferred};
+use super::residual::{RESIDUAL_MAX, loss, residual, size};
+use super::{NEIGHBOURS_MOST, ScatteredKernel, Settings, preferred};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
 use crate::interpolate::Coordinates;
 use crate::interpolate::coordinates::Pair;
-use crate::symmetry::Symmetry;
+use crate::symmetry::{MirrorPlane, Symmetry, SymmetryKind};
 use rayon::prelude::*;
 
 /// Places that are left out and predicted, at most: each alone, or with its frame.
 const TESTS: usize = 240;
 /// The same where a weak dependence on the azimuth is looked for.
 const MANY_TESTS: usize = 1500;
+/// In fewer places than this a plane of symmetry is looked for only if it is asked for.
+const PLANE_MIN: usize = 300;
 /// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 24;
-/// A residual beyond this counts as this …
-const RESIDUAL_MAX: f64 = 1.0;
-/// … and in the search for a dependence on the azimuth, beyond so many times the median of all.
+/// In the search for a dependence on the azimuth a residual beyond so many times the median of all counts as that.
 const OUTLIER: f64 = 5.0;
 /// Of two settings the simpler one is taken unless its error is larger by this share …
 const WORSE_SHARE: f64 = 0.02;
@@ -36,7 +39,7 @@ const Z95: f64 = 1.96;
 /// The factor of standard errors where nothing was tested: rather wide.
 const UNTESTED_FACTOR: f64 = 2.0;
 /// Tested factors lie between these.
-const FACTORS: (f64, f64) = (0.5, 20.0);
+const FACTORS: (f64, f64) = (1.0, 20.0);
 
 /// Kernels and nuggets that compete: smooth to rough, little noise to much.
 const KERNELS: [(ScatteredKernel, f64); 5] = [
@@ -47,7 +50,17 @@ const KERNELS: [(ScatteredKernel, f64); 5] = [
     (ScatteredKernel::Exponential, 1e-2),
 ];
 /// Then the best nugget is tried times these.
-const NUGGETS: [f64; 4] = [0.1, 0.3, 3.0, 10.0];
+const NUGGETS: [f64; 7] = [0.1, 0.3, 3.0, 10.0, 30.0, 100.0, 1000.0];
+/// Then noise of a variance of so many times the square of the median residual, with the nugget times these.
+const NOISES: [f64; 6] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.4];
+const NOISE_NUGGETS: [f64; 2] = [1e-3, 0.1];
+/// Then so many neighbours are merged into one …
+const MERGED: [usize; 3] = [4, 16, 64];
+/// … with the nugget times these, where so many are left.
+const MERGED_NUGGETS: [f64; 3] = [1.0, 0.35, 0.1];
+const MERGED_MIN: usize = 100;
+/// They predict as well where the mean error is not larger by this share.
+const AS_NEAR: f64 = 0.01;
 
 /// Why a symmetry was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,8 +118,8 @@ impl Choice {
     }
 }
 
-pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
-    let one_azimuth = has_one_azimuth(data);
+pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
+    let one_azimuth = has_one_azimuth(&data.places);
     let reason = match asked {
         Some(_) => Reason::Asked,
         None if one_azimuth => Reason::Assumed,
@@ -117,9 +130,9 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
         return untested(asked, one_azimuth, reason);
     }
     let symmetries: &[Symmetry] = match asked {
-        Some(Symmetry::Isotropic | Symmetry::Turns) => &[Symmetry::Isotropic, Symmetry::Turns],
-        Some(Symmetry::HalfTurn) => &[Symmetry::HalfTurn],
-        Some(Symmetry::None) => &[Symmetry::None],
+        Some(SymmetryKind::Isotropic) => &[Symmetry::Isotropic, Symmetry::Turns],
+        Some(SymmetryKind::HalfTurn | SymmetryKind::HalfTurnBilateral) => &[Symmetry::HalfTurn],
+        Some(SymmetryKind::None | SymmetryKind::Bilateral) => &[Symmetry::None],
         None if one_azimuth => &[Symmetry::Isotropic, Symmetry::Turns],
         None => &[
             Symmetry::Isotropic,
@@ -144,23 +157,21 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
         .map(Trial::median)
         .fold(RESIDUAL_MAX, f64::min);
     let may_depend_on_azimuth = asked.is_none() && !one_azimuth;
-    let mut best = tests.tuned(
-        simplest(&trials, &tests, usual, may_depend_on_azimuth),
-        usual,
-    );
+    let start = simplest(&trials, &tests, usual, may_depend_on_azimuth);
+    let start = match start.settings.symmetry.is_isotropic() {
+        true => start,
+        false => with_plane(&trials, &tests, usual, asked),
+    };
+    let mut best = tests.tuned(start, usual);
     if may_depend_on_azimuth && best.settings.symmetry.is_isotropic() {
         // A weak dependence takes more tests, and the settings with the least error of their own.
         let many = Tests::new(data, MANY_TESTS);
         if many.shows_azimuth(&many.trial(best.settings)) {
-            let anisotropic: Vec<Trial> = trials
-                .into_iter()
-                .filter(|trial| !trial.settings.symmetry.is_isotropic())
-                .collect();
-            best = tests.tuned(simplest(&anisotropic, &tests, usual, false), usual);
+            best = tests.tuned(with_plane(&trials, &tests, usual, asked), usual);
         }
     }
     let contradicted_by = asked
-        .filter(|symmetry| *symmetry != Symmetry::None)
+        .filter(|kind| *kind != SymmetryKind::None)
         .and_then(|_| contradiction(&tests, &best, usual));
     Choice {
         settings: best.settings,
@@ -172,7 +183,7 @@ pub(super) fn choose(data: &[Datum], asked: Option<Symmetry>) -> Choice {
 }
 
 /// What is taken of too few data to test anything by.
-fn untested(asked: Option<Symmetry>, one_azimuth: bool, reason: Reason) -> Choice {
+fn untested(asked: Option<SymmetryKind>, one_azimuth: bool, reason: Reason) -> Choice {
     let unasked = if one_azimuth {
         Symmetry::Isotropic
     } else {
@@ -184,13 +195,54 @@ fn untested(asked: Option<Symmetry>, one_azimuth: bool, reason: Reason) -> Choic
         reason
     };
     let settings = Settings {
-        symmetry: asked.unwrap_or(unasked),
+        symmetry: asked.map_or(unasked, SymmetryKind::untested),
         ..Settings::DEFAULT
     };
     Choice {
         reason,
         ..Choice::of(settings)
     }
+}
+
+/// The simplest anisotropic trial that the data do not contradict, those with a plane among them: about the azimuth
+/// that predicts best.
+fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, asked: Option<SymmetryKind>) -> Trial {
+    let of = |symmetry: Symmetry| {
+        let own = trials
+            .iter()
+            .filter(move |t| t.settings.symmetry == symmetry);
+        own.cloned().collect::<Vec<Trial>>()
+    };
+    let with = [of(Symmetry::HalfTurn), of(Symmetry::None)].concat();
+    let start = simplest(&with, tests, usual, false);
+    let (turned, alone) = match asked {
+        None if tests.data.places.len() < PLANE_MIN => return start,
+        None => (true, true),
+        Some(SymmetryKind::HalfTurnBilateral) => (true, false),
+        Some(SymmetryKind::Bilateral) => (false, true),
+        _ => return start,
+    };
+    let plane = mirror_plane(tests.data, start.settings);
+    let trial = |symmetry: fn(MirrorPlane) -> Symmetry| {
+        tests.trial(Settings {
+            symmetry: symmetry(plane),
+            ..start.settings
+        })
+    };
+    let mut all = Vec::new();
+    if turned {
+        all.push(trial(Symmetry::HalfTurnBilateral));
+    }
+    if asked.is_none() {
+        all.extend(of(Symmetry::HalfTurn));
+    }
+    if alone {
+        all.push(trial(Symmetry::Bilateral));
+    }
+    if asked.is_none() {
+        all.extend(of(Symmetry::None));
+    }
+    simplest(&all, tests, usual, false)
 }
 
 /// The error without the symmetry that was asked for, where the data contradict that.
@@ -226,11 +278,18 @@ fn simplest(trials: &[Trial], tests: &Tests, usual: f64, may_depend_on_azimuth: 
         predictions: Vec::new(),
         residuals: Vec::new(),
         error: f64::INFINITY,
+        log_likelihood: f64::NEG_INFINITY,
     })
 }
 
 /// Whether the first is worse than the second beyond chance.
 fn worse(a: &Trial, b: &Trial, usual: f64) -> bool {
+    let (difference, chance) = difference(a, b, usual);
+    difference > WORSE_SHARE * b.level(usual) && difference > WORSE_SIGMAS * chance
+}
+
+/// By how much the first predicts worse than the second, and the standard error of that.
+fn difference(a: &Trial, b: &Trial, usual: f64) -> (f64, f64) {
     let n = a.residuals.len().min(b.residuals.len()) as f64;
     let differences = || {
         let pairs = a.residuals.iter().zip(&b.residuals);
@@ -238,30 +297,39 @@ fn worse(a: &Trial, b: &Trial, usual: f64) -> bool {
     };
     let mean = differences().sum::<f64>() / n;
     let variance = differences().map(|d| (d - mean).powi(2)).sum::<f64>() / n;
-    mean > WORSE_SHARE * b.level(usual) && mean > WORSE_SIGMAS * (variance / n).sqrt()
+    (mean, (variance / n).sqrt())
 }
 
-/// Mean over the channels of a residual's size.
-fn size(residual: &[f64; 3]) -> f64 {
-    residual.iter().map(|r| r.abs()).sum::<f64>() / 3.0
-}
-
-/// What a residual counts: by its square where it is of the usual size, which noise makes, and by its root where
-/// it is far larger, so that a few places on a peak do not hide what all others say.
-fn loss(residual: &[f64; 3], usual: f64) -> f64 {
-    size(residual).hypotenuse(usual).sqrt() - usual.sqrt()
+/// Whether the first is no worse than the second, even by chance, by either measure.
+fn is_as_near(a: &Trial, b: &Trial, usual: f64) -> bool {
+    let (difference, chance) = difference(a, b, usual);
+    difference <= chance && a.error <= (1.0 + AS_NEAR) * b.error
 }
 
 /// Places that are left out.
 struct Tests<'a> {
-    data: &'a [Datum],
+    data: &'a Data,
     numbers: Vec<usize>,
+}
+
+/// Data near a place, nearest first.
+struct Around {
+    place: Pair,
+    near: Vec<Near>,
+    /// Those that are less than they were without the place's own group, beside their number among the near ones.
+    less: Vec<(usize, Datum)>,
+}
+
+/// What tests are predicted from, as long as settings differ in the kernel alone.
+struct Neighbourhoods {
+    merged: Merged,
+    tests: Vec<Neighbourhood>,
 }
 
 /// What a test is predicted from: data nearest first around its place, and around the reciprocal one.
 struct Neighbourhood {
-    own: (Pair, Vec<Near>),
-    reciprocal: Option<(Pair, Vec<Near>)>,
+    own: Around,
+    reciprocal: Option<Around>,
 }
 
 /// Settings, and what they predict of the tests.
@@ -272,13 +340,15 @@ struct Trial {
     /// Logarithm of predicted over measured, per channel.
     residuals: Vec<[f64; 3]>,
     error: f64,
+    /// Sum of those of the systems.
+    log_likelihood: f64,
 }
 
 impl<'a> Tests<'a> {
-    fn new(data: &'a [Datum], at_most: usize) -> Self {
-        let count = data.len().min(at_most);
+    fn new(data: &'a Data, at_most: usize) -> Self {
+        let (all, count) = (data.places.len(), data.places.len().min(at_most));
         // Evenly among all, in an order without the period of any scan.
-        let numbers = (0..count).map(|k| (k * data.len() + data.len() / 2) / count);
+        let numbers = (0..count).map(|k| (k * all + all / 2) / count);
         Self {
             data,
             numbers: numbers.collect(),
@@ -291,48 +361,69 @@ impl<'a> Tests<'a> {
 
     /// The data around the tests without their own groups, as many as any trial takes: they do not depend on
     /// the kernel.
-    fn neighbourhoods(&self, settings: Settings) -> Vec<Neighbourhood> {
-        let places = Places::new(self.data, &settings);
+    fn neighbourhoods(&self, settings: Settings) -> Neighbourhoods {
+        let merged = Merged::new(self.data, &settings);
+        let places = Places::new(&merged.data, &settings);
         let around = |test: &Datum, place: Pair| {
-            let keep = |other: u32| self.data[other as usize].group != test.group;
-            (
-                place,
-                places.around(place, NEIGHBOURS_MOST, &settings, keep),
-            )
+            let without = |datum| merged.without(datum, test.group, self.data, &settings);
+            let keep = |datum: u32| !matches!(without(datum), Without::Nothing);
+            let near = places.around(place, NEIGHBOURS_MOST, &settings, keep);
+            let less = near
+                .iter()
+                .enumerate()
+                .filter_map(|(k, near)| match without(near.datum) {
+                    Without::Less(datum) => Some((k, datum)),
+                    _ => None,
+                })
+                .collect();
+            Around { place, near, less }
         };
-        self.numbers
+        let tests = self
+            .numbers
             .par_iter()
             .map(|number| {
-                let test = &self.data[*number];
+                let test = &self.data.places[*number];
                 let place = settings.coordinates.pair(test.light, test.view);
                 Neighbourhood {
                     own: around(test, place),
                     reciprocal: (!settings.reciprocal_data).then(|| around(test, exchanged(place))),
                 }
             })
-            .collect()
+            .collect();
+        Neighbourhoods { merged, tests }
     }
 
-    fn trial_at(&self, neighbourhoods: &[Neighbourhood], settings: Settings) -> Trial {
-        let data = self.data;
-        let predicted = |(place, near): &(Pair, Vec<Near>)| {
-            let near = &near[..near.len().min(settings.neighbours)];
-            predict_from(data, near, &settings, *place)
+    fn trial_at(&self, neighbourhoods: &Neighbourhoods, settings: Settings) -> Trial {
+        let predicted = |around: &Around| {
+            let near = &around.near[..around.near.len().min(settings.neighbours)];
+            let data = &neighbourhoods.merged.data;
+            let mut here: Vec<&Datum> = near.iter().map(|n| &data[n.datum as usize]).collect();
+            for (k, datum) in &around.less {
+                if let Some(here) = here.get_mut(*k) {
+                    *here = datum;
+                }
+            }
+            match Local::fit_to(&here, near, &settings) {
+                Some(local) => (local.at(&around.place), local.log_likelihood()),
+                None => (Predicted::NOTHING, 0.0),
+            }
         };
-        let predictions: Vec<Predicted> = neighbourhoods
+        let (predictions, likelihoods): (Vec<Predicted>, Vec<f64>) = neighbourhoods
+            .tests
             .par_iter()
             .map(|here| {
-                let own = predicted(&here.own);
+                let (own, likelihood) = predicted(&here.own);
                 match &here.reciprocal {
-                    Some(reciprocal) => preferred(&own, &predicted(reciprocal)),
-                    None => own,
+                    Some(reciprocal) => (preferred(&own, &predicted(reciprocal).0), likelihood),
+                    None => (own, likelihood),
                 }
             })
-            .collect();
+            .unzip();
+        let places = &self.data.places;
         let residuals: Vec<[f64; 3]> = predictions
             .iter()
             .zip(&self.numbers)
-            .map(|(p, n)| [0, 1, 2].map(|c| residual(p.value[c], data[*n].value[c])))
+            .map(|(p, n)| [0, 1, 2].map(|c| residual(p.value[c], places[*n].value[c])))
             .collect();
         let error = residuals.iter().map(size).sum::<f64>() / residuals.len() as f64;
         Trial {
@@ -340,6 +431,7 @@ impl<'a> Tests<'a> {
             predictions,
             residuals,
             error,
+            log_likelihood: likelihoods.iter().sum(),
         }
     }
 
@@ -372,18 +464,104 @@ impl<'a> Tests<'a> {
                 around = others;
             }
         }
-        let found = best.settings.nugget;
-        for factor in NUGGETS {
-            let settings = best.settings.with_nugget(found * factor);
-            self.try_at(&around, settings, usual, &mut best);
-        }
+        self.with_likely_nugget(&around, usual, &mut best);
+        self.with_noise(&around, usual, &mut best);
+        self.merge(usual, &mut best);
         best
+    }
+
+    /// Of nuggets that predict alike, the one with which the data are most likely: residuals are mostly noise, and
+    /// say little of it.
+    fn with_likely_nugget(&self, around: &Neighbourhoods, usual: f64, best: &mut Trial) {
+        let found = best.settings;
+        let mut trials: Vec<Trial> = NUGGETS
+            .into_iter()
+            .map(|factor| Settings {
+                nugget: found.nugget * factor,
+                ..found
+            })
+            .map(|settings| self.trial_at(around, settings))
+            .collect();
+        trials.push(best.clone());
+        let nearest = trials
+            .iter()
+            .min_by(|a, b| a.level(usual).total_cmp(&b.level(usual)));
+        let Some(nearest) = nearest.cloned() else {
+            return;
+        };
+        let likely = trials
+            .into_iter()
+            .filter(|trial| !worse(trial, &nearest, usual))
+            .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+        if let Some(likely) = likely {
+            let settings = found.with_nugget(likely.settings.nugget);
+            *best = if settings == likely.settings {
+                likely
+            } else {
+                self.trial_at(around, settings)
+            };
+        }
+    }
+
+    /// With noise that is the same everywhere, where that predicts better.
+    fn with_noise(&self, around: &Neighbourhoods, usual: f64, best: &mut Trial) {
+        let found = best.settings;
+        let scale = best.median().powi(2);
+        let mut trials = vec![best.clone()];
+        for share in NOISES {
+            for factor in NOISE_NUGGETS {
+                let settings = Settings {
+                    noise_variance: share * scale,
+                    ..found.with_nugget((found.nugget * factor).max(1e-7))
+                };
+                trials.push(self.trial_at(around, settings));
+            }
+        }
+        let nearest = trials
+            .iter()
+            .min_by(|a, b| a.level(usual).total_cmp(&b.level(usual)));
+        let Some(nearest) = nearest.cloned() else {
+            return;
+        };
+        // Of those that predict alike, the one whose errors are what it says.
+        let honest = trials
+            .into_iter()
+            .filter(|trial| !worse(trial, &nearest, usual))
+            .max_by(|a, b| a.score().total_cmp(&b.score()));
+        if let Some(honest) = honest {
+            *best = honest;
+        }
+    }
+
+    /// Neighbours are merged as long as nothing is predicted worse.
+    fn merge(&self, usual: f64, best: &mut Trial) {
+        for merged in MERGED {
+            if self.data.places.len() < MERGED_MIN * merged {
+                return;
+            }
+            let settings = Settings {
+                merged,
+                ..best.settings
+            };
+            let around = self.neighbourhoods(settings);
+            let trials = MERGED_NUGGETS.map(|factor| {
+                let settings = settings.with_nugget(best.settings.nugget * factor);
+                self.trial_at(&around, settings)
+            });
+            let nearest = trials
+                .into_iter()
+                .min_by(|a, b| a.level(usual).total_cmp(&b.level(usual)));
+            match nearest {
+                Some(nearest) if is_as_near(&nearest, best, usual) => *best = nearest,
+                _ => return,
+            }
+        }
     }
 
     /// Takes settings in place of the best ones where they predict better.
     fn try_at(
         &self,
-        around: &[Neighbourhood],
+        around: &Neighbourhoods,
         settings: Settings,
         usual: f64,
         best: &mut Trial,
@@ -420,7 +598,11 @@ impl<'a> Tests<'a> {
             .iter()
             .map(|r| (r.iter().sum::<f64>() / 3.0).clamp(-cap, cap))
             .collect();
-        let at: Vec<Vec<f64>> = self.numbers.iter().map(|n| waves(&self.data[*n])).collect();
+        let at: Vec<Vec<f64>> = self
+            .numbers
+            .iter()
+            .map(|n| waves(&self.data.places[*n]))
+            .collect();
         let count = residuals.len() as f64;
         let mean = residuals.iter().sum::<f64>() / count;
         (0..WAVES).any(|k| {
@@ -452,7 +634,21 @@ impl Trial {
         sizes.get(sizes.len() / 2).copied().unwrap_or(RESIDUAL_MAX)
     }
 
-    /// With which 95 % of the residuals lie within 1.96 standard errors, noise included.
+    /// How likely the residuals are by the variances that are predicted with them, by Student's distribution with four
+    /// degrees of freedom: few that are far off do not outweigh all others.
+    fn score(&self) -> f64 {
+        let pairs = self.residuals.iter().zip(&self.predictions);
+        pairs
+            .map(|(r, p)| {
+                let variance = (p.relative[1].powi(2) + p.noise[1]).max(1e-18);
+                let far = 1.0 + r[1] * r[1] / (4.0 * variance);
+                -0.5 * variance.natural_log() - 2.5 * far.natural_log()
+            })
+            .sum()
+    }
+
+    /// With which 95 % of the residuals lie within 1.96 standard errors, noise included; the more noise hides of the
+    /// error, the nearer to what the systems say themselves.
     fn factor(&self) -> f64 {
         let mut squares: Vec<f64> = self
             .residuals
@@ -468,19 +664,14 @@ impl Trial {
         squares.sort_by(f64::total_cmp);
         // Of few, rather one too many.
         let rank = ((0.95 * squares.len() as f64).ceil() as usize).min(squares.len() - 1);
-        squares[rank].max(0.0).sqrt().clamp(FACTORS.0, FACTORS.1)
+        let shown = squares[rank].clamp(FACTORS.0.powi(2), FACTORS.1.powi(2));
+        let shares = self.predictions.iter().map(|p| {
+            let variance = p.relative[1].powi(2).max(1e-18);
+            variance / (variance + p.noise[1])
+        });
+        let share = shares.sum::<f64>() / self.predictions.len() as f64;
+        (share * shown + 1.0 - share).sqrt()
     }
-}
-
-/// Logarithm of predicted over measured; of what is noise about zero, the difference over the predicted.
-fn residual(predicted: f64, measured: f64) -> f64 {
-    let ratio = measured / predicted.max(1e-300);
-    let residual = if ratio > 0.2 {
-        -ratio.natural_log()
-    } else {
-        1.0 - ratio
-    };
-    residual.clamp(-RESIDUAL_MAX, RESIDUAL_MAX)
 }
 
 /// Whether all lights, or all views, lie on one axis through the normal.

@@ -24,8 +24,35 @@ pub(super) struct Datum {
     pub group: u32,
 }
 
-/// The places, in an order that depends on the samples alone.
-pub(super) fn merged(samples: &[Sample]) -> Vec<Datum> {
+/// All places.
+pub(super) struct Data {
+    pub places: Vec<Datum>,
+    /// What counts for less, per channel, where logarithms are taken.
+    floors: [f64; 3],
+}
+
+impl Data {
+    pub fn new(samples: &[Sample]) -> Self {
+        let mut places = places(samples);
+        let floors = [0, 1, 2].map(|c| floor(places.iter().map(|d| d.value[c])));
+        let mut data = Self {
+            places: Vec::new(),
+            floors,
+        };
+        for datum in &mut places {
+            datum.log = data.logs(datum.value);
+        }
+        data.places = places;
+        data
+    }
+
+    pub fn logs(&self, value: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|c| value[c].max(self.floors[c]).natural_log())
+    }
+}
+
+/// The places, in an order that depends on the samples alone, without their logarithms.
+fn places(samples: &[Sample]) -> Vec<Datum> {
     let key = |s: &Sample| {
         [s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg]
             .map(|angle| (f64::from(angle) / SAME_DEG).round() as i64)
@@ -37,7 +64,7 @@ pub(super) fn merged(samples: &[Sample]) -> Vec<Datum> {
         .collect();
     sorted.sort_by_key(|(key, _)| *key);
     let framed = samples.iter().any(|s| s.frame != Sample::NO_FRAME);
-    let mut data: Vec<Datum> = sorted
+    sorted
         .chunk_by(|a, b| a.0 == b.0)
         .enumerate()
         .map(|(number, same)| {
@@ -56,12 +83,12 @@ pub(super) fn merged(samples: &[Sample]) -> Vec<Datum> {
                 group: if framed { s.frame } else { number as u32 },
             }
         })
-        .collect();
-    let floors = [0, 1, 2].map(|c| floor(data.iter().map(|d| d.value[c])));
-    for datum in &mut data {
-        datum.log = [0, 1, 2].map(|c| datum.value[c].max(floors[c]).natural_log());
-    }
-    data
+        .collect()
+}
+
+/// How many places samples have.
+pub(super) fn count_places(samples: &[Sample]) -> usize {
+    places(samples).len()
 }
 
 fn floor(values: impl Iterator<Item = f64>) -> f64 {

@@ -1,30 +1,43 @@
 //! A kriging system through the data around a place, in double precision.
 
 use super::data::Datum;
-use super::places::{Near, distance2, radius_of};
-use super::{Response, ScatteredKernel, Settings};
+use super::nugget::{largest_nugget, likely_nugget};
+use super::places::Near;
+use super::wide::{Axes, Correlations, Covariance, Factor, covariances, dot};
+use super::{Response, Settings};
 use crate::elementary::Elementary;
 use crate::interpolate::coordinates::Pair;
+use pulp::Arch;
 
 /// Ordinary kriging (constant unknown mean) of three channels with one factorisation.
 pub(super) struct Local {
+    arch: Arch,
     response: Response,
-    places: Vec<Pair>,
-    /// Rows of the lower factor of `K + nugget`.
-    factor: Vec<f64>,
+    at: Axes,
+    covariance: Covariance,
+    factor: Factor,
     /// `L⁻¹ 1` and the square of its length.
     ones: Vec<f64>,
     ones2: f64,
-    /// `K⁻¹ (y − μ)`, channel by channel.
-    weights: [Vec<f64>; 3],
-    mean: [f64; 3],
-    /// Variance of the process, channel by channel, by maximum likelihood.
-    signal: [f64; 3],
-    limits: [(f64, f64); 3],
-    kernel: ScatteredKernel,
-    scale: f64,
+    /// Those of one channel, or of all: what stands in all three is worked on once.
+    channels: Vec<Channel>,
     nugget: f64,
+    /// Mean variance of a datum's noise over that of one sample.
+    shares: f64,
 }
+
+/// One channel of a system.
+struct Channel {
+    /// `K⁻¹ (y − μ)`.
+    weights: Vec<f64>,
+    mean: f64,
+    /// Variance of the process, by maximum likelihood.
+    signal: f64,
+    limits: (f64, f64),
+}
+
+/// Memory for the covariances of a place.
+pub(super) type Work = Vec<f64>;
 
 /// A value and what is known of it.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +51,13 @@ pub(super) struct Predicted {
 }
 
 impl Predicted {
+    /// Of no data.
+    pub const NOTHING: Self = Self {
+        value: [1e-30; 3],
+        relative: [f64::INFINITY; 3],
+        noise: [0.0; 3],
+    };
+
     /// Whether it was predicted at all: values are positive.
     pub fn is_known(&self) -> bool {
         self.value[0] > 0.0
@@ -54,217 +74,164 @@ const ABOVE_ZERO: f64 = 0.1;
 const NOISE_MAX: f64 = 0.25;
 
 impl Local {
-    /// `None` of no data.
+    /// `None` of no data. The range is in radii of the usual number of data, however many there are.
     pub fn fit(data: &[Datum], near: &[Near], settings: &Settings) -> Option<Self> {
-        if near.is_empty() {
-            return None;
-        }
         let here: Vec<&Datum> = near.iter().map(|n| &data[n.datum as usize]).collect();
-        let response = Response::of(&here);
-        let values = |c: usize| -> Vec<f64> {
-            here.iter()
-                .map(|d| match response {
-                    Response::Logarithm => d.log[c],
-                    Response::Linear => d.value[c],
-                })
-                .collect()
+        Self::fit_to(&here, near, settings)
+    }
+
+    /// The same of data that stand beside their places.
+    pub fn fit_to(here: &[&Datum], near: &[Near], settings: &Settings) -> Option<Self> {
+        let usual = near.get(settings.neighbours - 1).or(near.last())?;
+        let response = Response::of(here);
+        let arch = Arch::new();
+        let covariance = Covariance {
+            kernel: settings.kernel,
+            scale: settings.kernel.scale() / (settings.range * usual.distance()),
         };
-        let scale = settings.kernel.scale() / (settings.range * radius_of(near));
-        let places: Vec<Pair> = near.iter().map(|n| n.pair).collect();
+        let at = Axes::of(near.iter().map(|n| n.pair));
         let noise: Vec<f64> = here.iter().map(|d| 1.0 / d.count).collect();
+        let values = |c: usize| -> Vec<f64> {
+            let value = |d: &&Datum| match response {
+                Response::Logarithm => d.log[c],
+                Response::Linear => d.value[c],
+            };
+            here.iter().map(value).collect()
+        };
+        let all = [0, 1, 2].map(values);
         let mut nugget = settings.nugget;
+        let of_green = (&all[1][..], &noise[..]);
+        if response == Response::Linear {
+            nugget += largest_nugget(arch, near, of_green, covariance, settings);
+        } else if settings.noise_variance > 0.0 {
+            nugget += likely_nugget(arch, near, of_green, covariance, settings);
+        }
+        let correlations = Correlations::new(arch, &at, covariance);
         let factor = loop {
-            match factored(&places, &noise, settings.kernel, scale, nugget) {
+            match correlations.factor(arch, nugget, &noise) {
                 Some(factor) => break factor,
                 // Larger than this, the matrix is diagonally dominant.
                 None if nugget > 1e6 => return None,
                 None => nugget = 10.0 * nugget.max(1e-12),
             }
         };
-        let n = places.len();
-        let mut ones = vec![1.0; n];
-        forward(&factor, &mut ones);
-        let ones2: f64 = ones.iter().map(|x| x * x).sum();
+        let mut ones = vec![1.0; near.len()];
+        factor.forward(arch, &mut ones);
+        let ones2 = dot(arch, &ones, &ones);
         let mut local = Self {
+            arch,
             response,
-            places,
+            at,
+            covariance,
             factor,
             ones,
             ones2,
-            weights: [const { Vec::new() }; 3],
-            mean: [0.0; 3],
-            signal: [0.0; 3],
-            limits: [(0.0, 0.0); 3],
-            kernel: settings.kernel,
-            scale,
+            channels: Vec::new(),
             nugget,
+            shares: noise.iter().sum::<f64>() / noise.len() as f64,
         };
-        for c in 0..3 {
-            let own = values(c);
-            // Of one channel, which stands in all three, the work is done once.
-            if c > 0 && own == values(c - 1) {
-                local.copy(c - 1, c);
-            } else {
-                local.load(c, &own);
-            }
-        }
+        let is_grey = all[0] == all[1] && all[1] == all[2];
+        local.channels = all[..if is_grey { 1 } else { 3 }]
+            .iter()
+            .map(|values| local.channel(values))
+            .collect();
         Some(local)
     }
 
-    fn copy(&mut self, from: usize, to: usize) {
-        self.weights[to] = self.weights[from].clone();
-        self.mean[to] = self.mean[from];
-        self.signal[to] = self.signal[from];
-        self.limits[to] = self.limits[from];
-    }
-
-    fn load(&mut self, c: usize, values: &[f64]) {
+    fn channel(&self, values: &[f64]) -> Channel {
         let n = values.len();
         let mut y = values.to_vec();
-        forward(&self.factor, &mut y);
-        let along: f64 = y.iter().zip(&self.ones).map(|(a, b)| a * b).sum();
-        let mean = along / self.ones2;
+        self.factor.forward(self.arch, &mut y);
+        let mean = dot(self.arch, &y, &self.ones) / self.ones2;
         for (y, one) in y.iter_mut().zip(&self.ones) {
             *y -= mean * one;
         }
-        let squares: f64 = y.iter().map(|x| x * x).sum();
-        self.signal[c] = squares / (n.max(2) - 1) as f64;
-        backward(&self.factor, &mut y);
-        self.mean[c] = mean;
-        self.weights[c] = y;
+        let squares = dot(self.arch, &y, &y);
+        self.factor.backward(self.arch, &mut y);
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let beyond = match self.response {
             Response::Logarithm => (BEYOND_SHARE * (high - low)).clamp(BEYOND.0, BEYOND.1),
             Response::Linear => 0.0,
         };
-        self.limits[c] = (low - beyond, high + beyond);
+        Channel {
+            weights: y,
+            mean,
+            signal: squares / (n.max(2) - 1) as f64,
+            limits: (low - beyond, high + beyond),
+        }
+    }
+
+    /// Logarithm of how likely the data are, the variance of the process being what makes them most likely; mean over
+    /// the channels.
+    pub fn log_likelihood(&self) -> f64 {
+        let n = self.at.len() as f64 - 1.0;
+        let signal = |c: &Channel| c.signal.max(1e-30).natural_log();
+        let signals: f64 = self.channels.iter().map(signal).sum();
+        let signals = signals / self.channels.len() as f64;
+        -0.5 * (n * signals + self.factor.log_determinant() + self.ones2.natural_log())
     }
 
     /// The value at a place near the data, aligned as they are.
     pub fn at(&self, place: &Pair) -> Predicted {
-        self.at_with(place, true)
+        self.at_with(place, true, &mut Vec::new())
     }
 
     /// The same; without its error, which takes most of the time, that is 0.
-    pub fn at_with(&self, place: &Pair, with_error: bool) -> Predicted {
-        let mut k: Vec<f64> = self
-            .places
+    pub fn at_with(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted {
+        covariances(self.arch, &self.at, self.covariance, place, work);
+        let fitted = self
+            .channels
             .iter()
-            .map(|p| self.kernel.at(self.scale * distance2(p, place).sqrt()))
-            .collect();
-        let fitted = [0, 1, 2].map(|c| {
-            let sum: f64 = k.iter().zip(&self.weights[c]).map(|(a, b)| a * b).sum();
-            (self.mean[c] + sum).clamp(self.limits[c].0, self.limits[c].1)
-        });
-        // The least value of noise about zero is a share of its error.
-        let unit = if with_error || self.response == Response::Linear {
-            self.unit_variance(&mut k)
-        } else {
-            0.0
-        };
+            .map(|c| (c.mean + dot(self.arch, work, &c.weights)).clamp(c.limits.0, c.limits.1));
         let mut predicted = Predicted {
-            value: fitted,
+            value: [0.0; 3],
             relative: [0.0; 3],
             noise: [0.0; 3],
         };
-        for c in 0..3 {
-            let error = (unit * self.signal[c]).sqrt();
+        for (value, fitted) in predicted.value.iter_mut().zip(fitted) {
+            *value = fitted;
+        }
+        // The least value of noise about zero is a share of its error.
+        let unit = if with_error || self.response == Response::Linear {
+            self.unit_variance(work)
+        } else {
+            0.0
+        };
+        for (c, channel) in self.channels.iter().enumerate() {
+            let fitted = predicted.value[c];
+            let error = (unit * channel.signal).sqrt();
             match self.response {
                 Response::Logarithm => {
                     // Noise that is as much above as below lies lower in logarithms, by half its variance.
-                    let noise = self.nugget * self.signal[c];
+                    let noise = self.nugget * channel.signal;
                     predicted.noise[c] = noise;
-                    predicted.value[c] = (fitted[c] + 0.5 * noise.min(NOISE_MAX)).exponential();
+                    predicted.value[c] =
+                        (fitted + 0.5 * (noise * self.shares).min(NOISE_MAX)).exponential();
                     predicted.relative[c] = error;
                 }
                 Response::Linear => {
-                    let value = fitted[c].max(ABOVE_ZERO * error).max(1e-30);
+                    let value = fitted.max(ABOVE_ZERO * error).max(1e-30);
                     predicted.value[c] = value;
                     predicted.relative[c] = error / value;
-                    predicted.noise[c] = self.nugget * self.signal[c] / (value * value);
+                    predicted.noise[c] = self.nugget * channel.signal / (value * value);
                 }
             }
         }
+        if self.channels.len() == 1 {
+            predicted.value = [predicted.value[0]; 3];
+            predicted.relative = [predicted.relative[0]; 3];
+            predicted.noise = [predicted.noise[0]; 3];
+        }
         predicted
     }
-}
 
-impl Local {
     /// Kriging variance over that of the process, of the covariances `k` of a place with the data, which are
     /// spoilt.
     fn unit_variance(&self, k: &mut [f64]) -> f64 {
-        forward(&self.factor, k);
-        let squares: f64 = k.iter().map(|x| x * x).sum();
-        let along: f64 = k.iter().zip(&self.ones).map(|(a, b)| a * b).sum();
+        self.factor.forward(self.arch, k);
+        let squares = dot(self.arch, k, k);
+        let along = dot(self.arch, k, &self.ones);
         (1.0 - squares + (1.0 - along).powi(2) / self.ones2).max(1e-12)
-    }
-}
-
-/// The rows of L, one after the other, each as long as its number and one.
-fn factored(
-    places: &[Pair],
-    noise: &[f64],
-    kernel: ScatteredKernel,
-    scale: f64,
-    nugget: f64,
-) -> Option<Vec<f64>> {
-    let n = places.len();
-    let mut l: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);
-    for i in 0..n {
-        let start = l.len();
-        for j in 0..i {
-            let own = kernel.at(scale * distance2(&places[i], &places[j]).sqrt());
-            let row_j = &l[j * (j + 1) / 2..];
-            let row_i = &l[start..start + j];
-            let x = (own - dot(row_i, &row_j[..j])) / row_j[j];
-            l.push(x);
-        }
-        let row = &l[start..];
-        let pivot = 1.0 + nugget * noise[i] - dot(row, row);
-        if pivot.is_nan() || pivot <= 1e-12 {
-            return None;
-        }
-        l.push(pivot.sqrt());
-    }
-    Some(l)
-}
-
-/// In four sums, so that the processor need not wait for each: the same four everywhere.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a4.zip(b4) {
-        for k in 0..4 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums[0] + sums[1] + (sums[2] + sums[3]) + rest
-}
-
-fn forward(l: &[f64], x: &mut [f64]) {
-    let mut start = 0;
-    for i in 0..x.len() {
-        let row = &l[start..=start + i];
-        x[i] = (x[i] - dot(&row[..i], &x[..i])) / row[i];
-        start += i + 1;
-    }
-}
-
-fn backward(l: &[f64], x: &mut [f64]) {
-    for i in (0..x.len()).rev() {
-        let start = i * (i + 1) / 2;
-        let row = &l[start..=start + i];
-        x[i] /= row[i];
-        let at = x[i];
-        for (below, l) in x[..i].iter_mut().zip(row) {
-            *below -= l * at;
-        }
     }
 }

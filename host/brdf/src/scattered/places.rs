@@ -2,6 +2,8 @@
 
 use super::Settings;
 use super::data::Datum;
+use crate::direction::Vec3;
+use crate::elementary::Elementary;
 use crate::interpolate::coordinates::Pair;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use std::num::NonZero;
@@ -12,6 +14,13 @@ pub(super) struct Near {
     pub pair: Pair,
     pub datum: u32,
     distance2: f64,
+}
+
+impl Near {
+    /// From the place that it is near to; above zero.
+    pub fn distance(&self) -> f64 {
+        self.distance2.sqrt().max(1e-6)
+    }
 }
 
 /// All images of all data.
@@ -45,6 +54,11 @@ impl Places {
             tree: ImmutableKdTree::new_from_slice(&at).ok(),
             images,
         }
+    }
+
+    /// Number of images.
+    pub fn images(&self) -> usize {
+        self.images.len()
     }
 
     /// The `n` images nearest to a place, nearest first, of data that are kept.
@@ -100,9 +114,26 @@ impl Places {
     }
 }
 
+/// Both turned about the normal so that the light, or if that is nearer to the normal the view, has azimuth 0.
+pub(super) fn turned_to_axis(light: Vec3, view: Vec3) -> (Vec3, Vec3) {
+    let planar = |v: Vec3| v[0].hypotenuse(v[1]);
+    let to = if planar(light) >= planar(view) {
+        light
+    } else {
+        view
+    };
+    let length = planar(to);
+    if length < 1e-12 {
+        return (light, view);
+    }
+    let (cos, sin) = (to[0] / length, to[1] / length);
+    let turned = |v: Vec3| [cos * v[0] + sin * v[1], cos * v[1] - sin * v[0], v[2]];
+    (turned(light), turned(view))
+}
+
 /// Radius of a neighbourhood.
 pub(super) fn radius_of(near: &[Near]) -> f64 {
-    near.last().map_or(0.0, |n| n.distance2.sqrt()).max(1e-6)
+    near.last().map_or(1e-6, Near::distance)
 }
 
 /// With light and view exchanged.

@@ -30,10 +30,13 @@ struct Table {
 }
 
 impl ScatteredFit {
-    /// The values of all cells of a grid and their standard errors per channel, of a fit with the symmetry
-    /// [`Turns`](crate::Symmetry::Turns) or [`Isotropic`](crate::Symmetry::Isotropic). Positive, finite, exactly
-    /// reciprocal, one value a pole.
-    pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
+    /// [`Self::dense`] of a fit with the symmetry [`Turns`](crate::Symmetry::Turns) or
+    /// [`Isotropic`](crate::Symmetry::Isotropic).
+    pub(super) fn dense_by_table(
+        &self,
+        grid: Grid,
+        with_errors: bool,
+    ) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
         let table = Table::new(self, grid, with_errors);
         let factor = self.choice.error_factor;
         let values = table.spread(|p, c| p.value[c]);
@@ -192,6 +195,7 @@ impl Filler<'_> {
         let Some(local) = Local::fit(&fit.data, &near, settings) else {
             return;
         };
+        let mut work = Vec::new();
         for i in part.start[0]..part.end[0] {
             for v in part.start[1]..part.end[1] {
                 for d in part.start[2]..part.end[2] {
@@ -202,7 +206,7 @@ impl Filler<'_> {
                     let place = settings.symmetry.aligned(place, middle);
                     out.push((
                         Table::cell(self.grid, [i, v, d]),
-                        local.at_with(&place, self.with_errors),
+                        local.at_with(&place, self.with_errors, &mut work),
                     ));
                 }
             }
