@@ -130,9 +130,7 @@ fn calibrated_session(folder: &Path) -> Vec<String> {
     ]
 }
 
-/// `cargo test -p gonia --test capture calibrates_first -- --ignored`
 #[test]
-#[ignore = "two minutes: frames of which a rig can be found are not small"]
 fn a_session_that_calibrates_first_goes_on_after_kills_with_the_rig_that_its_frames_show() {
     let undisturbed = tempfile::tempdir().unwrap();
     let arguments = calibrated_session(undisturbed.path());

@@ -175,7 +175,16 @@ impl<'a> Look<'a> {
             Ok(load(self.rig, self.source, row).map(|(frame, _)| work(row, &frame)))
         };
         let all: Vec<Result<_, Cancelled>> = rows.par_iter().map(one).collect();
-        Ok(all.into_iter().collect::<Result<Looked<T>, Cancelled>>()?)
+        let mut looked = Vec::with_capacity(rows.len());
+        for frame in all {
+            match frame? {
+                Err(error) if error.is_of_the_system() => {
+                    return Err(CalibrateError::Frames(error));
+                }
+                frame => looked.push(frame),
+            }
+        }
+        Ok(looked)
     }
 
     /// Lines of frames, those without any left out.

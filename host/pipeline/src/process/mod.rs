@@ -163,7 +163,7 @@ pub enum ProcessError {
 
 impl ProcessError {
     /// Whether it would meet other frames alike: see [`FileError::is_of_the_system`].
-    fn is_of_the_system(&self) -> bool {
+    pub(crate) fn is_of_the_system(&self) -> bool {
         matches!(self, Self::Load { source, .. } if source.is_of_the_system())
     }
 }
