@@ -1,8 +1,8 @@
 //! The trigger wire: pulses out by TIM3's channel 2, and the edges of the other arm's captured by its channel
 //! 3, both in the microseconds that the board's clock counts.
 //!
-//! The timer raises and lowers the output; the interrupt only tells it when. A pulse longer than TIM3 counts
-//! is told in parts.
+//! The timer raises and lowers the output; the interrupt only sets the count at which. A pulse longer than TIM3
+//! counts is timed in parts.
 
 use core::cell::RefCell;
 
@@ -21,9 +21,9 @@ use crate::{now_us, time};
 /// Channel 2 gives pulses, channel 3 captures edges; counted from 0.
 const OUT: usize = 1;
 const IN: usize = 2;
-/// A pulse begins so long after it was asked for, µs: the registers are written by then.
+/// A pulse begins so long after its request, µs: the registers are written by then.
 const LEAD_US: u64 = 8;
-/// What is left of a pulse is told at once up to this, µs, and in parts of the other beyond it.
+/// The rest of a pulse is timed in one part up to this, µs; a longer one in parts of the second constant.
 const LONGEST_US: u64 = 60_000;
 const PART_US: u64 = 30_000;
 
@@ -38,7 +38,7 @@ enum Pulse {
     Rising {
         ends_us: u64,
     },
-    /// It is high, and ends beyond what the timer can be told.
+    /// It is high, and ends beyond what the timer counts.
     High {
         ends_us: u64,
     },
@@ -119,7 +119,7 @@ fn on_match() {
     });
 }
 
-/// The output is high: tells the timer when it falls, or when to be told.
+/// The output is high: sets the count at which it falls, or at which its next part begins.
 fn go_on(ends_us: u64) -> Pulse {
     let left_us = ends_us.saturating_sub(now_us());
     if left_us > LONGEST_US {

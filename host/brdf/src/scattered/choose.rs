@@ -18,7 +18,7 @@ use rayon::prelude::*;
 const TESTS: usize = 240;
 /// The same where a weak dependence on the azimuth is looked for.
 const MANY_TESTS: usize = 1500;
-/// In fewer places than this a plane of symmetry is looked for only if it is asked for.
+/// With fewer places than this a plane of symmetry is searched for only on request.
 const PLANE_MIN: usize = 300;
 /// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 24;

@@ -36,7 +36,8 @@ use rayon::prelude::*;
 
 /// More places than this are not few.
 pub const FEW: usize = 100_000;
-/// More places than this of an anisotropic material fill a grid faster block by block, and as near.
+/// Above this many places an anisotropic material is interpolated block by block: faster, with about the same
+/// error.
 pub const FEW_ANISOTROPIC: usize = 20_000;
 /// Fewer places than this say nothing.
 pub const PLACES_MIN: usize = 8;

@@ -29,7 +29,8 @@ pub(super) struct Places {
     tree: Option<ImmutableKdTree<f32, 6>>,
 }
 
-/// The search takes turned places for up to twice as near as they are: it returns this many times the places wanted.
+/// The search underestimates the distance of turned places by up to a factor of two: so it returns this many
+/// times the number of places that are needed.
 const MORE: usize = 3;
 /// Images of one datum within this of each other are one.
 const SAME2: f64 = 1e-12;
