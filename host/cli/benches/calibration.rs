@@ -25,7 +25,7 @@ mod drawing;
 mod rendered;
 
 /// Rigs of a row.
-const RIGS: u64 = 5;
+const RIGS: u64 = 3;
 
 /// What frames there are, and of what rig.
 #[derive(Clone, Copy)]

@@ -155,7 +155,7 @@ impl Light {
         let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
         let at = CAMERA.len();
         allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
-        let kept = free(&are_free(&states), prior.len());
+        let kept = free(&are_free(&LIGHT, &states), prior.len());
         let solved = solve_light(
             &shading,
             &nominal,
