@@ -25,7 +25,7 @@ cargo xtask test     set up what the tests need, then all that a change must pas
 cargo xtask doors    which crate may use which, which file imports which, how long functions are
 cargo xtask boards   build the firmware of every board
 cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/images
-cargo xtask image [--all | NAME]  the image that is flashed, on an emulated chip with the arm on its pins
+cargo xtask image [BOARD] [--all | NAME]  the images that are flashed, on an emulated chip with the arm on its pins
 cargo xtask size     flash and RAM of every board against its budget
 cargo xtask systems  lint everything for Windows and macOS (the tests do so for Windows)
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target

@@ -14,10 +14,12 @@
 //! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
 //! | [`board`] | the main loop of every board, and what a board gives it |
 //! | [`hardware`], [`ssi`] | what a board must offer; an absolute encoder over `embedded-hal` |
+//! | [`clock`] | a board's counter made one of 64 bits, and its alarm |
 #![no_std]
 
 pub mod axis;
 pub mod board;
+pub mod clock;
 pub mod controller;
 pub mod error_map;
 pub mod hardware;

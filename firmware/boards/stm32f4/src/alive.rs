@@ -2,15 +2,21 @@
 //! itself, and a watchdog.
 //!
 //! TIM8 runs for 10 ms and stops (one-pulse mode); the main loop sets it back every round. While it runs, its
-//! trigger output lets TIM5 and TIM2 count, which give the steps, and its channel 1 holds the interlock's
-//! relay. So whatever stops the processor (a fault in a fault handler, a loop without end, a debugger) stops
+//! trigger output lets TIM5 and TIM2 count, which give the steps, and one of its channels holds the
+//! interlock's relay. So whatever stops the processor (a fault in a fault handler, a loop without end, a debugger) stops
 //! the steps within 10 ms, and the relay lets go. The watchdog restarts the chip soon after.
 
+use core::cell::Cell;
+
+use critical_section::Mutex;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
 use embassy_stm32::pac::timer::vals::{Mms, Ocm, Urs};
 use embassy_stm32::pac::{self};
 use embassy_stm32::{peripherals, rcc};
+use gonia_pins::signals::Signal;
+use gonia_pins::{Board, LIFE_TIMER, StepEdge};
 
+use crate::gpio::{DRIVEN, Line, give, off, output, switch_output};
 use crate::pulses;
 
 /// The main loop comes round at least this often, µs.
@@ -19,20 +25,30 @@ pub const ROUND_US: u64 = 4_000;
 const PRESCALER: u16 = 16_800;
 /// 10 ms.
 const STEPS_END: u16 = 100;
-/// 2 s, for an erase: at rest.
-const STRETCHED: u16 = 20_000;
-/// Of the watchdog, whose clock is somewhere between 17 and 47 kHz: 100 ms and 2 s at 32 kHz.
+/// 2.5 s, for an erase, which takes two at most: at rest.
+const STRETCHED: u16 = 25_000;
+/// Of the watchdog, whose clock is somewhere between 17 and 47 kHz: 100 ms and 3.6 s at 32 kHz, which are 2.4 s at
+/// 47 kHz.
 const WATCHDOG: u16 = 100;
-const WATCHDOG_STRETCHED: u16 = 2_000;
+const WATCHDOG_STRETCHED: u16 = 3_600;
 /// The output is high from this count on: as soon as the timer runs.
 const ENERGISED: u16 = 1;
 /// The count that it never reaches.
 const OPEN: u16 = u16::MAX;
-/// The pin PC3, which gives the drivers their current.
-const DRIVERS: usize = 3;
+
+/// What is switched off when the processor cannot go on.
+static BOARD: Mutex<Cell<Option<&'static Board>>> = Mutex::new(Cell::new(None));
+
+fn board() -> Option<&'static Board> {
+    critical_section::with(|cs| BOARD.borrow(cs).get())
+}
 
 /// Starts the timer and the watchdog; the relay closes, and steps can be given.
-pub fn start() {
+pub fn start(of: &'static Board) {
+    critical_section::with(|cs| BOARD.borrow(cs).set(Some(of)));
+    for &enable in of.enables {
+        output(enable.wire, off(enable));
+    }
     // A debugger that halts the processor halts these too: no step, no relay, no reset meanwhile.
     pac::DBGMCU.apb1fzr().modify(|w| {
         w.set_tim2(true);
@@ -48,19 +64,42 @@ pub fn start() {
     tim.psc().write_value(PRESCALER - 1);
     tim.arr().write(|w| w.set_arr(STEPS_END));
     tim.cr2().write(|w| w.set_mms(Mms::ENABLE));
-    tim.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
-    tim.ccr(0).write(|w| w.set_ccr(ENERGISED));
-    tim.ccer().write(|w| w.set_cce(0, true));
+    let (relay, channel) = (of.relay, relay_channel(of));
+    tim.ccmr_output(channel / 2)
+        .write(|w| w.set_ocm(channel % 2, Ocm::PWM_MODE2));
+    tim.ccr(channel).write(|w| w.set_ccr(ENERGISED));
+    tim.ccer().write(|w| match relay.is_complementary {
+        // Enabled alone, it is not the other's opposite (RM0390, table of OCx and OCxN).
+        true => w.set_ccne(channel, true),
+        false => w.set_cce(channel, true),
+    });
     tim.bdtr().write(|w| w.set_moe(true));
     tim.cr1().write(|w| {
         w.set_opm(true);
         w.set_urs(Urs::COUNTER_ONLY);
     });
     tim.egr().write(|w| w.set_ug(true));
+    let signal = match relay.is_complementary {
+        true => Signal::TimerComplement(LIFE_TIMER, relay.channel),
+        false => Signal::Timer(LIFE_TIMER, relay.channel),
+    };
+    give(relay.wire, signal, DRIVEN);
 
     pac::IWDG.kr().write(|w| w.set_key(Key::START));
     set_watchdog(WATCHDOG);
     keep();
+}
+
+/// Counted from 0.
+fn relay_channel(of: &Board) -> usize {
+    usize::from(of.relay.channel) - 1
+}
+
+/// The drivers get their current.
+pub fn give_current() {
+    for &enable in board().map_or(&[][..], |of| of.enables) {
+        switch_output(enable, true);
+    }
 }
 
 /// The main loop has come round.
@@ -78,7 +117,9 @@ fn run_on() {
 /// Holds this controller's part of the chain open, or closes it.
 pub fn hold_open(open: bool) {
     let count = if open { OPEN } else { ENERGISED };
-    pac::TIM8.ccr(0).write(|w| w.set_ccr(count));
+    if let Some(of) = board() {
+        pac::TIM8.ccr(relay_channel(of)).write(|w| w.set_ccr(count));
+    }
 }
 
 /// Work that takes longer than a round, at rest: nothing moves, so nothing has to be stopped meanwhile.
@@ -114,5 +155,15 @@ pub fn all_off() {
     pac::TIM8.bdtr().write(|_| {});
     pac::TIM8.cr1().write(|_| {});
     pulses::off();
-    pac::GPIOC.bsrr().write(|w| w.set_br(DRIVERS, true));
+    let Some(of) = board() else {
+        return;
+    };
+    for &enable in of.enables {
+        switch_output(enable, false);
+    }
+    for axis in of.axes {
+        if axis.edge == StepEdge::Interrupt {
+            Line::of(axis.step.pin).set(gonia_pins::Level::Low);
+        }
+    }
 }

@@ -1,22 +1,20 @@
 //! Everything that one arm's controller is wired to.
 
 use embassy_stm32::gpio::Input;
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::spi::Spi;
-use embassy_stm32::spi::mode::Master;
 use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
 use gonia_firmware::ssi::SsiEncoder;
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
+use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
 use crate::{alive, now_us, pulses, steps};
 
 /// Pins, encoders and memory; the drivers are with the step timers. Pairs are θ and φ.
 pub struct ArmPins {
     /// The shafts.
-    pub encoders: [SsiEncoder<Spi<'static, Blocking, Master>>; 2],
+    pub encoders: [SsiEncoder<EncoderSpi>; 2],
     /// To ground when closed.
     pub home_switches: [Input<'static>; 2],
     /// To ground while the chain is closed, so that a cut wire stops the arm.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Result, ensure};
+use gonia_pins::Board;
 
 use super::{Outcome, done, started};
 use crate::chips::lock;
@@ -10,14 +11,8 @@ use crate::chips::lock;
 /// What a register must hold: name, address, the bits that count, their value, why.
 type Expected = (&'static str, u64, u32, u32, &'static str);
 
+/// The same on every board.
 const EXPECTED: &[Expected] = &[
-    (
-        "RCC_PLLCFGR",
-        0x4002_3804,
-        0x0043_7FFF,
-        0x0040_2A04,
-        "HSE 8 MHz / 4 · 168 / 2 = 168 MHz (6.3.2)",
-    ),
     (
         "RCC_CFGR",
         0x4002_3808,
@@ -77,21 +72,6 @@ const EXPECTED: &[Expected] = &[
         0x10,
         "its enable is its trigger output",
     ),
-    ("TIM8_CCMR1", 0x4001_0418, 0x73, 0x70, "PWM 2: low at rest"),
-    (
-        "SPI1_CR1",
-        0x4001_3000,
-        0x3B,
-        0x3A & 0x3B,
-        "84 MHz / 256 = 328 kHz, clock high at rest",
-    ),
-    (
-        "SPI2_CR1",
-        0x4000_3800,
-        0x3B,
-        0x32 & 0x3B,
-        "42 MHz / 128 = 328 kHz, clock high at rest",
-    ),
     ("IWDG_PR", 0x4000_3004, 7, 3, "/ 32: 1 kHz"),
     ("IWDG_RLR", 0x4000_3008, 0xFFF, 100, "100 ms"),
     (
@@ -104,13 +84,56 @@ const EXPECTED: &[Expected] = &[
     ("DBGMCU_APB2_FZ", 0xE004_200C, 2, 2, "and TIM8"),
 ];
 
+/// What depends on the board: the divider of its crystal, its relay's channel, its encoders' SPIs.
+fn of_board(board: &Board) -> Vec<Expected> {
+    let prediv = board.crystal.hz / 2_000_000;
+    let mut expected: Vec<Expected> = vec![(
+        "RCC_PLLCFGR",
+        0x4002_3804,
+        0x0043_7FFF,
+        0x0040_2A00 | prediv,
+        "HSE to 2 MHz, · 168 / 2 = 168 MHz (6.3.2)",
+    )];
+    let channel = u32::from(board.relay.channel) - 1;
+    let shift = 8 * (channel % 2);
+    expected.push((
+        "TIM8_CCMR of the relay",
+        0x4001_0418 + 4 * u64::from(channel / 2),
+        0x73 << shift,
+        0x70 << shift,
+        "PWM 2: low at rest",
+    ));
+    let enabled = if board.relay.is_complementary { 4 } else { 1 };
+    expected.push((
+        "TIM8_CCER",
+        0x4001_0420,
+        0xFFFF,
+        enabled << (4 * channel),
+        "the relay's output, and no other",
+    ));
+    for axis in board.axes {
+        expected.push(match axis.encoder.spi {
+            1 => ("SPI1_CR1", 0x4001_3000, 0x3B, 0x3A, SSI_BY_256),
+            2 => ("SPI2_CR1", 0x4000_3800, 0x3B, 0x32, SSI_BY_128),
+            3 => ("SPI3_CR1", 0x4000_3C00, 0x3B, 0x32, SSI_BY_128),
+            _ => ("SPI4_CR1", 0x4001_3400, 0x3B, 0x3A, SSI_BY_256),
+        });
+    }
+    expected
+}
+
+const SSI_BY_256: &str = "84 MHz / 256 = 328 kHz, clock high at rest";
+const SSI_BY_128: &str = "42 MHz / 128 = 328 kHz, clock high at rest";
+
 /// Fastest clock for 50 m of cable, Hz.
 const SSI_HZ: f64 = 400_000.0;
 
 pub fn as_the_manual_says(elf: &Path) -> Result<Outcome> {
     let mut rig = started(elf)?;
     let mut wrong = Vec::new();
-    for &(name, address, mask, expected, why) in EXPECTED {
+    let mut all = of_board(rig.board);
+    all.extend(EXPECTED);
+    for &(name, address, mask, expected, why) in &all {
         let is = rig.peek(address)? & mask;
         if is != expected {
             wrong.push(format!("{name} is {is:#x} where {expected:#x} means {why}"));
@@ -121,7 +144,7 @@ pub fn as_the_manual_says(elf: &Path) -> Result<Outcome> {
     ensure!(hz.iter().all(|&hz| hz <= SSI_HZ), "SSI at {hz:?} Hz");
     let figure = format!(
         "{} registers; SSI at {:.0} and {:.0} Hz",
-        EXPECTED.len(),
+        all.len(),
         hz[0],
         hz[1]
     );
