@@ -67,6 +67,9 @@ pub const BTT_OCTOPUS: Board = Board {
         channel: 2,
         is_complementary: true,
     },
+    // Every other output of TIM8 is a socket's, the SD card's or the display's.
+    brakes: None,
+    alarms: None,
     trigger_out: TimerOutput {
         wire: wire(Pin::new('B', 5), "SPI3: MOSI"),
         channel: 2,
