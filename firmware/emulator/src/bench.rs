@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, Sender};
 use gonia_pins::signals::{Signal, function};
 use gonia_pins::{
     Board, CLOCK_TIMER, FLASH, FLASH_LEN, LIFE_TIMER, Level as Wanted, Pin as PinOf, SECTORS,
-    STEP_TIMERS, StepEdge,
+    STEP_TIMERS, StepEdge, TimerOutput,
 };
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
@@ -18,6 +18,7 @@ use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::time::VirtualNanos;
 
 use crate::chips::{Shared, lock};
+use crate::nvic;
 use crate::part::Bench;
 
 /// What the script asks of the chip's side while the clock stands.
@@ -29,8 +30,10 @@ pub enum Command {
     HoldCore(bool),
     /// The processor's next access here ends in a bus fault.
     Fail(u64),
-    /// A register.
+    /// A register of a peripheral.
     Peek(u64),
+    /// An interrupt in the core's NVIC, as [`nvic::Interrupt::to_word`] has it.
+    Interrupt(usize),
     /// The other arm raises the trigger wire, or lets it go.
     TriggerIn(bool),
     /// The reset pin goes low and comes back.
@@ -65,6 +68,7 @@ struct Outputs {
     directions: [Output; 2],
     enables: Vec<Output>,
     relay: Output,
+    brakes: Option<Output>,
     trigger: Output,
 }
 
@@ -82,14 +86,17 @@ impl Outputs {
             }
             StepEdge::Interrupt => high(axis.step.pin, Source::Plain),
         };
-        let (relay, out) = (board.relay, board.trigger_out);
-        let signal = if relay.is_complementary {
-            Signal::TimerComplement(LIFE_TIMER, relay.channel)
-        } else {
-            Signal::Timer(LIFE_TIMER, relay.channel)
+        let out = board.trigger_out;
+        let of_tim8 = |output: TimerOutput| {
+            let signal = if output.is_complementary {
+                Signal::TimerComplement(LIFE_TIMER, output.channel)
+            } else {
+                Signal::Timer(LIFE_TIMER, output.channel)
+            };
+            let given = function(output.wire.pin, signal).unwrap_or(0);
+            let source = Source::Tim8(given, output.channel, output.is_complementary);
+            high(output.wire.pin, source)
         };
-        let given = function(relay.wire.pin, signal).unwrap_or(0);
-        let tim8 = Source::Tim8(given, relay.channel, relay.is_complementary);
         let enables = board.enables.iter().map(|enable| Output {
             pin: enable.wire.pin,
             source: Source::Plain,
@@ -102,7 +109,8 @@ impl Outputs {
             steps: [step(0, theta), step(1, phi)],
             directions: [theta, phi].map(|axis| high(axis.direction.pin, Source::Plain)),
             enables: enables.collect(),
-            relay: high(relay.wire.pin, tim8),
+            relay: of_tim8(board.relay),
+            brakes: board.brakes.map(of_tim8),
             trigger: high(out.wire.pin, timer(out.wire.pin, CLOCK_TIMER, out.channel)),
         }
     }
@@ -163,7 +171,7 @@ struct State {
     trigger: bool,
     gate: Option<Level>,
     time_pulses: u64,
-    inputs: [Option<Level>; 3],
+    inputs: [Option<Level>; 5],
     resets: usize,
     is_erasing: bool,
     core_is_held: bool,
@@ -204,12 +212,12 @@ impl Wiring {
         let mut world = lock(&self.world);
         world.now_ns = at.0;
         let outputs = &self.outputs;
+        let enabled = outputs.enables.iter().all(|&enable| is_on(chip, enable));
+        let released = outputs.brakes.is_none_or(|brakes| is_on(chip, brakes));
+        world.see_power(enabled, released);
         for i in 0..2 {
             let up = is_on(chip, outputs.directions[i]);
-            // One for both drivers, or one each.
-            let enable = outputs.enables.get(i).or(outputs.enables.first());
             let axis = &mut world.axes[i];
-            axis.is_enabled = enable.is_some_and(|&enable| is_on(chip, enable));
             if up != axis.up {
                 axis.up = up;
                 axis.turned_ns = at.0;
@@ -230,14 +238,17 @@ impl Wiring {
         world.relay.energise(is_on(chip, outputs.relay), at.0);
         let now_us = at.0 / 1000;
         let switches = [0, 1].map(|i| world.axes[i].plant.switch_closed(now_us));
+        let alarms = [0, 1].map(|i| world.axes[i].alarm_closed);
         let closed = world.chain_is_closed();
         drop(world);
         let [theta, phi] = self.board.axes;
-        let inputs = [
+        let mut inputs = vec![
             (theta.home_switch.pin, switches[0]),
             (phi.home_switch.pin, switches[1]),
             (self.board.interlock.pin, closed),
         ];
+        let wires = self.board.alarms.iter().flatten();
+        inputs.extend(wires.zip(alarms).map(|(wire, closed)| (wire.pin, closed)));
         for (known, (pin, closed)) in self.state.inputs.iter_mut().zip(inputs) {
             // A closed contact leads to ground; an open one leaves the pin to its pull-up.
             let drives = closed.then_some(Level::Low);
@@ -365,6 +376,12 @@ impl Driver<Bench> for Wiring {
                 Command::Fail(address) => session.fail_next(address, address + 4),
                 Command::Peek(address) => {
                     answer = peek(&mut session.board_mut().chip, stop.at, address);
+                }
+                Command::Interrupt(number) => {
+                    let lines = Operate::cpu(&session.board_mut().chip).interrupt_lines;
+                    let state = host.save_state().unwrap_or_default();
+                    let found = nvic::find(&state, usize::from(lines), number);
+                    answer = found.map_or(u32::MAX, nvic::Interrupt::to_word);
                 }
                 Command::TriggerIn(high) => {
                     let chip = &mut session.board_mut().chip;

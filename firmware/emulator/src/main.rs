@@ -3,6 +3,7 @@
 
 mod bench;
 mod chips;
+mod nvic;
 mod part;
 mod reference;
 mod rig;

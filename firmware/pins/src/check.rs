@@ -37,6 +37,8 @@ pub enum Fault {
     HostPorts,
     /// SPIs 1 to 4 read encoders, each one.
     SharedSpi(u8),
+    /// Relay and brakes on one channel of TIM8, which has one count for both.
+    SharedChannel(u8),
     /// The name is empty, too long, or has other characters than small letters, digits and hyphens.
     Name,
     /// Hz: the PLL cannot start from it.
@@ -88,6 +90,10 @@ impl fmt::Display for Fault {
                     "both encoders are on SPI{spi}; give each an SPI of its own"
                 )
             }
+            Self::SharedChannel(channel) => write!(
+                f,
+                "relay and brakes are on channel {channel} of TIM8; give each a channel of its own"
+            ),
             Self::Name => write!(
                 f,
                 "the name must have 1 to {NAME_MAX} small letters, digits and hyphens"
@@ -154,6 +160,10 @@ fn check_pins(board: &Board, report: &mut impl FnMut(Fault)) {
     }
     if board.host_tx.pin.port != board.host_rx.pin.port {
         report(Fault::HostPorts);
+    }
+    let relay = board.relay.channel;
+    if board.brakes.is_some_and(|brakes| brakes.channel == relay) {
+        report(Fault::SharedChannel(relay));
     }
     let [theta, phi] = board.axes.map(|axis| axis.encoder.spi);
     if theta == phi {
@@ -296,12 +306,16 @@ mod tests {
         board.trigger_in.channel = 1;
         board.axes[1].encoder.spi = 1;
         board.host_rx.pin = Pin::new('D', 6);
+        if let Some(brakes) = &mut board.brakes {
+            brakes.channel = board.relay.channel;
+        }
         let found = faults(&board);
         for fault in [
             Fault::Debugger(Pin::new('A', 13), "interlock chain"),
             Fault::NoPin(Pin::new('J', 1), "camera arm"),
             Fault::Alarm("trigger in"),
             Fault::SharedSpi(1),
+            Fault::SharedChannel(1),
             Fault::HostPorts,
         ] {
             assert!(found.contains(&fault), "{fault}: {found:?}");
@@ -347,7 +361,7 @@ mod tests {
     #[test]
     fn every_output_has_a_resistor_that_holds_it_off() {
         const FREE: Output = Output {
-            wire: wire(Pin::new('C', 4), ""),
+            wire: wire(Pin::new('C', 10), ""),
             on: Level::Low,
         };
         let board = Board {

@@ -193,6 +193,10 @@ pub struct Board {
     pub interlock: Wire,
     /// TIM8's, high: the relay closes this arm's part of the chain.
     pub relay: TimerOutput,
+    /// TIM8's, high: the brakes let go.
+    pub brakes: Option<TimerOutput>,
+    /// Alarm outputs of θ's and φ's driver, to ground when closed; the pins have pull-ups.
+    pub alarms: Option<[Wire; 2]>,
     /// TIM3's: the trigger's pulses.
     pub trigger_out: TimerOutput,
     /// TIM3's: the other arm's pulses.
@@ -239,6 +243,9 @@ impl Board {
             };
             plain("drivers' current", enable.wire, Some(off));
         }
+        for (alarm, names) in self.alarms.iter().flatten().zip(AXIS_ROLES) {
+            plain(names.alarm, *alarm, None);
+        }
         plain("interlock chain", self.interlock, None);
         plain("camera arm", self.camera_jumper, None);
         self.for_each_signal(&mut each);
@@ -282,6 +289,9 @@ impl Board {
         };
         let (relay, out, into) = (self.relay, self.trigger_out, self.trigger_in);
         carried("interlock relay", relay.wire, of(LIFE_TIMER, relay), low);
+        if let Some(brakes) = self.brakes {
+            carried("brakes", brakes.wire, of(LIFE_TIMER, brakes), low);
+        }
         carried("trigger out", out.wire, of(CLOCK_TIMER, out), low);
         carried("trigger in", into.wire, of(CLOCK_TIMER, into), None);
     }
@@ -293,6 +303,7 @@ struct AxisRoles {
     clock: &'static str,
     data: &'static str,
     home_switch: &'static str,
+    alarm: &'static str,
 }
 
 const AXIS_ROLES: [AxisRoles; 2] = [
@@ -302,6 +313,7 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         clock: "θ encoder clock",
         data: "θ encoder data",
         home_switch: "θ home switch",
+        alarm: "θ driver's alarm",
     },
     AxisRoles {
         step: "φ step",
@@ -309,5 +321,6 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         clock: "φ encoder clock",
         data: "φ encoder data",
         home_switch: "φ home switch",
+        alarm: "φ driver's alarm",
     },
 ];

@@ -2,9 +2,10 @@
 //! itself, and a watchdog.
 //!
 //! TIM8 runs for 10 ms and stops (one-pulse mode); the main loop sets it back every round. While it runs, its
-//! trigger output lets TIM5 and TIM2 count, which give the steps, and one of its channels holds the
-//! interlock's relay. So whatever stops the processor (a fault in a fault handler, a loop without end, a debugger) stops
-//! the steps within 10 ms, and the relay lets go. The watchdog restarts the chip soon after.
+//! trigger output lets TIM5 and TIM2 count, which give the steps, and its channels hold the interlock's
+//! relay and the brakes. So whatever stops the processor (a fault in a fault handler, a loop without end, a
+//! debugger) stops the steps within 10 ms, the relay lets go, and the brakes engage while the drivers still hold
+//! the arm. The watchdog restarts the chip soon after, and the drivers lose their current.
 
 use core::cell::Cell;
 
@@ -14,7 +15,7 @@ use embassy_stm32::pac::timer::vals::{Mms, Ocm, Urs};
 use embassy_stm32::pac::{self};
 use embassy_stm32::{peripherals, rcc};
 use gonia_pins::signals::Signal;
-use gonia_pins::{Board, LIFE_TIMER, StepEdge};
+use gonia_pins::{Board, LIFE_TIMER, StepEdge, TimerOutput};
 
 use crate::gpio::{DRIVEN, Line, give, off, output, switch_output};
 use crate::pulses;
@@ -35,6 +36,10 @@ const WATCHDOG_STRETCHED: u16 = 3_600;
 const ENERGISED: u16 = 1;
 /// The count that it never reaches.
 const OPEN: u16 = u16::MAX;
+/// A brake has engaged after so many parts of so many cycles of the processor, which are 5 ms at least and 10 at
+/// most.
+const BRAKE_PARTS: u32 = 10;
+const PART_CYCLES: u32 = 840_000;
 
 /// What is switched off when the processor cannot go on.
 static BOARD: Mutex<Cell<Option<&'static Board>>> = Mutex::new(Cell::new(None));
@@ -64,41 +69,54 @@ pub fn start(of: &'static Board) {
     tim.psc().write_value(PRESCALER - 1);
     tim.arr().write(|w| w.set_arr(STEPS_END));
     tim.cr2().write(|w| w.set_mms(Mms::ENABLE));
-    let (relay, channel) = (of.relay, relay_channel(of));
-    tim.ccmr_output(channel / 2)
-        .write(|w| w.set_ocm(channel % 2, Ocm::PWM_MODE2));
-    tim.ccr(channel).write(|w| w.set_ccr(ENERGISED));
-    tim.ccer().write(|w| match relay.is_complementary {
-        // Enabled alone, it is not the other's opposite (RM0390, table of OCx and OCxN).
-        true => w.set_ccne(channel, true),
-        false => w.set_cce(channel, true),
-    });
+    start_output(of.relay, ENERGISED);
+    if let Some(brakes) = of.brakes {
+        start_output(brakes, OPEN);
+    }
     tim.bdtr().write(|w| w.set_moe(true));
     tim.cr1().write(|w| {
         w.set_opm(true);
         w.set_urs(Urs::COUNTER_ONLY);
     });
     tim.egr().write(|w| w.set_ug(true));
-    let signal = match relay.is_complementary {
-        true => Signal::TimerComplement(LIFE_TIMER, relay.channel),
-        false => Signal::Timer(LIFE_TIMER, relay.channel),
-    };
-    give(relay.wire, signal, DRIVEN);
+    for output in [Some(of.relay), of.brakes].into_iter().flatten() {
+        give(output.wire, signal_of(output), DRIVEN);
+    }
 
     pac::IWDG.kr().write(|w| w.set_key(Key::START));
     set_watchdog(WATCHDOG);
     keep();
 }
 
-/// Counted from 0.
-fn relay_channel(of: &Board) -> usize {
-    usize::from(of.relay.channel) - 1
+/// Gives a channel of the timer its work: low at rest, and high from this count on.
+fn start_output(output: TimerOutput, count: u16) {
+    let (tim, channel) = (pac::TIM8, channel_of(output));
+    tim.ccmr_output(channel / 2)
+        .modify(|w| w.set_ocm(channel % 2, Ocm::PWM_MODE2));
+    tim.ccr(channel).write(|w| w.set_ccr(count));
+    tim.ccer().modify(|w| match output.is_complementary {
+        // Enabled alone, it is not the other's opposite (RM0390, table of OCx and OCxN).
+        true => w.set_ccne(channel, true),
+        false => w.set_cce(channel, true),
+    });
 }
 
-/// The drivers get their current.
-pub fn give_current() {
+/// Counted from 0.
+fn channel_of(output: TimerOutput) -> usize {
+    usize::from(output.channel) - 1
+}
+
+fn signal_of(output: TimerOutput) -> Signal {
+    match output.is_complementary {
+        true => Signal::TimerComplement(LIFE_TIMER, output.channel),
+        false => Signal::Timer(LIFE_TIMER, output.channel),
+    }
+}
+
+/// The drivers get their current, or lose it.
+pub fn switch_drivers(on: bool) {
     for &enable in board().map_or(&[][..], |of| of.enables) {
-        switch_output(enable, true);
+        switch_output(enable, on);
     }
 }
 
@@ -118,7 +136,18 @@ fn run_on() {
 pub fn hold_open(open: bool) {
     let count = if open { OPEN } else { ENERGISED };
     if let Some(of) = board() {
-        pac::TIM8.ccr(relay_channel(of)).write(|w| w.set_ccr(count));
+        let relay = pac::TIM8.ccr(channel_of(of.relay));
+        relay.write(|w| w.set_ccr(count));
+    }
+}
+
+/// Lets the brakes go, or engages them, where the board has an output for them.
+pub fn release_brakes(released: bool) {
+    let count = if released { ENERGISED } else { OPEN };
+    if let Some(brakes) = board().and_then(|of| of.brakes) {
+        pac::TIM8
+            .ccr(channel_of(brakes))
+            .write(|w| w.set_ccr(count));
     }
 }
 
@@ -146,7 +175,8 @@ fn set_watchdog(reload: u16) {
     iwdg.kr().write(|w| w.set_key(Key::RESET));
 }
 
-/// No step, no trigger, no current, the chain open: whatever state the rest is in. Nothing but registers.
+/// No step, no trigger, the chain open, brakes engaged, then no current: whatever state the rest is in. Nothing
+/// but registers.
 pub fn all_off() {
     for tim in [pac::TIM5, pac::TIM2] {
         tim.cr1().write(|_| {});
@@ -158,12 +188,17 @@ pub fn all_off() {
     let Some(of) = board() else {
         return;
     };
-    for &enable in of.enables {
-        switch_output(enable, false);
-    }
     for axis in of.axes {
         if axis.edge == StepEdge::Interrupt {
             Line::of(axis.step.pin).set(gonia_pins::Level::Low);
         }
     }
+    if of.brakes.is_some() {
+        // The drivers hold the arm until the brakes do; the watchdog waits for that.
+        for _ in 0..BRAKE_PARTS {
+            pac::IWDG.kr().write(|w| w.set_key(Key::RESET));
+            cortex_m::asm::delay(PART_CYCLES);
+        }
+    }
+    switch_drivers(false);
 }

@@ -41,7 +41,7 @@ use embedded_io_async::{Read, Write};
 use gonia_firmware::board::{self, Board, Wake};
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::node::{ControllerNode, identity};
-use gonia_firmware::ssi::SsiEncoder;
+use gonia_firmware::spi_encoder::SpiEncoder;
 use gonia_firmware::store::Store;
 use gonia_pins::check::PLL_INPUT_HZ;
 use gonia_pins::{Board as Pins, Crystal, Pin};
@@ -66,6 +66,7 @@ pub async fn run(of: &'static Pins) -> ! {
     let reset = take_reset_reason();
     let p = embassy_stm32::init(clocks(of.crystal));
     switch_on_caches();
+    set_brown_out_level();
     time::start();
 
     let mut sectors = FlashSectors::new(Flash::new_blocking(p.FLASH), of.layout.settings);
@@ -78,12 +79,13 @@ pub async fn run(of: &'static Pins) -> ! {
     let address = if is_camera { NODE_CAMERA } else { NODE_LIGHT };
     let encoders = of
         .axes
-        .map(|axis| SsiEncoder::new(EncoderSpi::start(axis.encoder)));
+        .map(|axis| SpiEncoder::new(EncoderSpi::start(axis.encoder)));
     pulses::start(of);
     steps::start(&of.axes);
     let pins = ArmPins {
         encoders,
         home_switches: of.axes.map(|axis| gpio::switch(axis.home_switch)),
+        alarms: of.alarms.map(|alarms| alarms.map(gpio::switch)),
         interlock: gpio::switch(of.interlock),
         store,
         sectors,
@@ -95,7 +97,6 @@ pub async fn run(of: &'static Pins) -> ! {
     static NODE: StaticCell<ControllerNode> = StaticCell::new();
     alive::start(of);
     pins.await_chain();
-    alive::give_current();
     let controller = ArmController::new(now_us(), settings.as_deref());
     let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
     let identity = identity(of.name, board::next_boot_id(), reset, last_panic);
@@ -177,6 +178,24 @@ fn switch_on_caches() {
         w.set_dcen(true);
         w.set_prften(true);
     });
+}
+
+/// Reset below 2.7 V (level 3): less is too little for 168 MHz and for erasing by words, and a processor that
+/// runs on does anything. The level is an option byte, which is written once in a board's life, and holds from
+/// the next reset on.
+fn set_brown_out_level() {
+    const KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
+    const LEVEL_3: u8 = 0;
+    if pac::FLASH.optcr().read().bor_lev() == LEVEL_3 {
+        return;
+    }
+    for key in KEYS {
+        pac::FLASH.optkeyr().write_value(key);
+    }
+    pac::FLASH.optcr().modify(|w| w.set_bor_lev(LEVEL_3));
+    pac::FLASH.optcr().modify(|w| w.set_optstrt(true));
+    while pac::FLASH.sr().read().bsy() {}
+    pac::FLASH.optcr().modify(|w| w.set_optlock(true));
 }
 
 /// The processor cannot go on: what moves is stopped first.

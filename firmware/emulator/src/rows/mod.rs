@@ -105,6 +105,23 @@ pub const ROWS: &[Row] = &[
         motion::stall_in_a_stop,
     ),
     row("host gone in mid-move", When::Asked, motion::host_gone),
+    row(
+        "cam of every turn on two turns",
+        When::Asked,
+        motion::turn_cam,
+    ),
+    row("home switch cut", When::Asked, motion::home_switch_cut),
+    row("BiSS-C rings", When::OneBoard, motion::biss_rings),
+    row(
+        "BiSS-C bit flipped on the way",
+        When::Asked,
+        motion::biss_bit_flips,
+    ),
+    row(
+        "driver's alarm and brakes",
+        When::EveryBoard,
+        safety::driver_alarm,
+    ),
     row("reversed motor and encoder", When::Asked, motion::reversed),
     row("homing and 50 poses", When::Asked, motion::fifty_poses),
 ];

@@ -53,6 +53,15 @@ pub const NUCLEO_F446RE: Board = Board {
         channel: 1,
         is_complementary: false,
     },
+    brakes: Some(TimerOutput {
+        wire: wire(Pin::new('C', 7), "D9"),
+        channel: 2,
+        is_complementary: false,
+    }),
+    alarms: Some([
+        wire(Pin::new('C', 4), "CN10-34"),
+        wire(Pin::new('C', 5), "CN10-6"),
+    ]),
     trigger_out: TimerOutput {
         wire: wire(Pin::new('B', 5), "D4"),
         channel: 2,
