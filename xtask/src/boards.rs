@@ -3,8 +3,10 @@
 use crate::size::{budget_of, size_of};
 use crate::tools::{add_targets, cargo, root, run};
 use anyhow::{Context, Result, bail};
+use gonia_pins::Board;
+use gonia_pins::boards::BOARDS;
+use gonia_pins::check::check;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// The board that runs in QEMU.
 const QEMU_BOARD: &str = "qemu-mps2";
@@ -26,36 +28,6 @@ pub fn size() -> Result<()> {
     check_sizes(&root)
 }
 
-/// Builds every board and leaves its image in `target/images`: ELF for a debugger, and plain bytes.
-pub fn images() -> Result<()> {
-    build()?;
-    run(Command::new("rustup").args(["component", "add", "llvm-tools"]))?;
-    let objcopy = objcopy()?;
-    let root = root()?;
-    let out = root.join("target/images");
-    std::fs::create_dir_all(&out).with_context(|| format!("{}", out.display()))?;
-    for program in programs(&root)? {
-        let image = out.join(format!("gonia-{}", program.name));
-        let program = program.elf;
-        let (elf, bin) = (image.with_extension("elf"), image.with_extension("bin"));
-        std::fs::copy(&program, &elf).with_context(|| format!("{}", program.display()))?;
-        let mut objcopy = Command::new(&objcopy);
-        // Between the vector table and the program lie the sectors of the settings: erased.
-        let arguments = ["-O", "binary", "--gap-fill", "0xFF"];
-        run(objcopy.args(arguments).arg(&elf).arg(&bin))?;
-        println!("{}\n{}", elf.display(), bin.display());
-    }
-    Ok(())
-}
-
-/// The objcopy of the component llvm-tools: it knows every chip that the compiler knows.
-fn objcopy() -> Result<PathBuf> {
-    let arguments = ["--print", "target-libdir"];
-    let output = Command::new("rustc").args(arguments).output()?;
-    let libraries = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
-    Ok(libraries.with_file_name("bin").join("llvm-objcopy"))
-}
-
 /// Adds every board's target to the toolchain.
 pub fn add_boards_targets(root: &Path) -> Result<()> {
     let boards = folders(root)?;
@@ -68,12 +40,27 @@ pub fn add_boards_targets(root: &Path) -> Result<()> {
     add_targets(&targets)
 }
 
-/// Lints and builds every board.
+/// Checks the pins of every board, then lints and builds it.
 pub fn build_all(root: &Path) -> Result<()> {
+    check_pins(BOARDS)?;
     for board in folders(root)? {
         println!("board {}", board.display());
         run(cargo(&board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
         run(cargo(&board).args(["build", "--release"]))?;
+    }
+    Ok(())
+}
+
+/// What cannot be of a board: two uses of a pin, a pin that its timer does not reach, settings in the image.
+fn check_pins(boards: &[&Board]) -> Result<()> {
+    let mut faults = Vec::new();
+    for board in boards {
+        check(board, |fault| {
+            faults.push(format!("{}: {fault}", board.name))
+        });
+    }
+    if !faults.is_empty() {
+        bail!("{}", faults.join("\n"));
     }
     Ok(())
 }
@@ -219,9 +206,21 @@ mod tests {
     #[test]
     fn every_board_of_the_pins_has_a_program() {
         let root = root().unwrap();
-        for board in gonia_pins::boards::BOARDS {
+        for board in BOARDS {
             elf(&root, board.name).unwrap();
         }
+    }
+
+    #[test]
+    fn a_board_with_two_uses_of_a_pin_is_not_built() {
+        check_pins(BOARDS).unwrap();
+        let mut wrong = gonia_pins::boards::BTT_OCTOPUS;
+        wrong.camera_jumper.pin = wrong.interlock.pin;
+        let error = check_pins(&[&wrong]).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "btt-octopus: PG10 is both interlock chain and camera arm; choose another pin for one"
+        );
     }
 
     #[test]

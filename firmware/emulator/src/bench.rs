@@ -223,8 +223,10 @@ impl Wiring {
                 axis.turned_ns = at.0;
             }
             let step = is_on(chip, outputs.steps[i]);
-            if step && !self.state.steps[i] {
-                axis.step(at.0);
+            match (self.state.steps[i], step) {
+                (false, true) => axis.step(at.0),
+                (true, false) => axis.fall(at.0),
+                _ => {}
             }
             self.state.steps[i] = step;
         }

@@ -53,8 +53,10 @@ pub struct Axis {
     pub last_ns: u64,
     /// Shortest time from a change of direction to a step, ns.
     pub setup_ns: u64,
-    /// Shortest time between two steps, ns.
-    pub shortest_ns: u64,
+    /// Times at which the step input rose, ns.
+    pub rises: Vec<u64>,
+    /// Shortest time for which it was high, ns.
+    pub narrowest_ns: u64,
     /// Motor and encoder are wired the other way round.
     pub is_reversed: bool,
     /// The contact of the driver's alarm output, which opens for an alarm.
@@ -110,7 +112,8 @@ impl Axis {
             edges: 0,
             last_ns: 0,
             setup_ns: u64::MAX,
-            shortest_ns: u64::MAX,
+            rises: Vec::new(),
+            narrowest_ns: u64::MAX,
             is_reversed: false,
             alarm_closed: true,
             can_turn: false,
@@ -131,9 +134,7 @@ impl Axis {
     /// The step input rises.
     pub fn step(&mut self, now_ns: u64) {
         self.setup_ns = self.setup_ns.min(now_ns - self.turned_ns);
-        if self.edges > 0 {
-            self.shortest_ns = self.shortest_ns.min(now_ns - self.last_ns);
-        }
+        self.rises.push(now_ns);
         self.last_ns = now_ns;
         self.edges += 1;
         self.given += if self.up { 1 } else { -1 };
@@ -142,6 +143,11 @@ impl Axis {
         } else {
             self.unheard += 1;
         }
+    }
+
+    /// The step input falls.
+    pub fn fall(&mut self, now_ns: u64) {
+        self.narrowest_ns = self.narrowest_ns.min(now_ns - self.last_ns);
     }
 
     /// Eight clocks of the SPI, ending now: what the data line brought.

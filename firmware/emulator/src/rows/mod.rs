@@ -1,5 +1,6 @@
 //! What is tried, row by row. Each starts a chip of its own.
 
+mod edges;
 mod motion;
 mod registers;
 mod safety;

@@ -8,7 +8,7 @@ use gonia_protocol::message::{ControllerState, Message, Move, RequestOutcome, Se
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::plant::HomeCam;
 
-use super::{Outcome, done, started, trigger};
+use super::{Outcome, done, edges, started, trigger};
 use crate::chips::lock;
 use crate::reference::Reference;
 use crate::rig::Rig;
@@ -20,9 +20,10 @@ const MOVE_US: u64 = 60_000_000;
 
 pub fn three_poses(elf: &Path) -> Result<Outcome> {
     let (mut rig, poses) = poses(elf, 3)?;
+    let edges = edges::on_time(&rig)?;
     let train = trigger::train(&mut rig)?;
     let followed = trigger::follows(&mut rig)?;
-    done(rig, format!("{poses}; {train}; {followed}"))
+    done(rig, format!("{poses}; {edges}; {train}; {followed}"))
 }
 
 pub fn fifty_poses(elf: &Path) -> Result<Outcome> {
