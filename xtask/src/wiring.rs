@@ -48,7 +48,7 @@ fn made(root: &Path) -> Result<Vec<(PathBuf, String)>> {
             .with_context(|| format!("{}", page.display()))?;
         files.push((page, text));
         let figure = folder.join(format!("wiring-{}.svg", board.name));
-        files.push((figure, wiring_figure::figure(board)));
+        files.push((figure, wiring_figure::figure(board, &uses(board))));
     }
     Ok(files)
 }
@@ -64,7 +64,7 @@ fn rewritten(page: &str, made: &str) -> Result<String> {
 }
 
 /// Every use of a pin, in the order of the page.
-pub fn uses(board: &Board) -> Vec<Use> {
+fn uses(board: &Board) -> Vec<Use> {
     let mut uses = Vec::new();
     board.for_each_use(|this| uses.push(this));
     let place = |this: &Use| ROLES.iter().position(|(role, _)| *role == this.role);
@@ -91,16 +91,19 @@ const ROLES: &[(&str, &str)] = &[
     ("θ encoder data", "RS-422 receiver of the ring's data"),
     ("φ encoder clock", "the same of φ's ring"),
     ("φ encoder data", "the same of φ's ring"),
-    ("θ home switch", "a contact to ground, normally closed"),
-    ("φ home switch", "a contact to ground, normally closed"),
+    (
+        "θ home switch",
+        "to ground; normally closed, it opens at home (`home_normally_closed`)",
+    ),
+    ("φ home switch", "the same of φ"),
     (
         "θ driver's alarm",
-        "a contact to ground, closed while all is well",
+        "to ground while all is well: alarm output of θ's driver",
     ),
     ("φ driver's alarm", "the same of φ's driver"),
     (
         "brakes",
-        "high lets both brakes go: their coils, through a transistor; without power they are engaged",
+        "high lets them go: the coils of both, through a transistor; without power they are engaged",
     ),
     (
         "interlock chain",
@@ -166,11 +169,11 @@ fn when_off(board: &Board, role: &str) -> Result<(&'static str, &'static str)> {
             "no current",
             "as it was until the watchdog's reset (0.07 s to 0.19 s), then off",
         ),
-        "interlock relay" => ("an open chain", "the chain opens after 10 ms: TIM8 again"),
         "brakes" => (
-            "brakes engaged",
-            "engaged after 10 ms, while the drivers still hold the arm: TIM8 again",
+            "no brake let go",
+            "they engage after 10 ms, while the drivers still hold the arm: TIM8 again",
         ),
+        "interlock relay" => ("an open chain", "the chain opens after 10 ms: TIM8 again"),
         "trigger out" => (
             "no pulse",
             "a pulse under way ends by itself, or at the reset",
@@ -186,7 +189,10 @@ mod tests {
     #[test]
     fn every_pin_of_every_board_stands_in_its_tables_and_its_figure() {
         for board in BOARDS {
-            let (text, figure) = (tables(board).unwrap(), wiring_figure::figure(board));
+            let (text, figure) = (
+                tables(board).unwrap(),
+                wiring_figure::figure(board, &uses(board)),
+            );
             for this in uses(board) {
                 let row = format!("| {} | {} |", this.role, this.wire.pin);
                 assert!(text.contains(&row), "{}: {row}", board.name);

@@ -4,15 +4,9 @@ use std::fmt::Write;
 
 use gonia_pins::{Board, Level, Use};
 
-use crate::wiring::uses;
-
 /// What is drawn as one box, its side (left: false), and how its roles begin or end.
 const BOXES: &[(&str, bool, &[&str])] = &[
-    (
-        "θ driver and motor",
-        false,
-        &["θ step", "θ direction", "θ driver's alarm"],
-    ),
+    ("θ driver and motor", false, &["θ step", "θ direction"]),
     (
         "θ ring encoder (RS-422)",
         false,
@@ -20,23 +14,24 @@ const BOXES: &[(&str, bool, &[&str])] = &[
     ),
     ("θ home switch", false, &["θ home switch"]),
     ("enable of the drivers", false, &["drivers' current"]),
-    ("brakes", false, &["brakes"]),
+    (
+        "alarms of the drivers",
+        false,
+        &["θ driver's alarm", "φ driver's alarm"],
+    ),
     (
         "chain and relay",
         false,
         &["interlock chain", "interlock relay"],
     ),
-    (
-        "φ driver and motor",
-        true,
-        &["φ step", "φ direction", "φ driver's alarm"],
-    ),
+    ("φ driver and motor", true, &["φ step", "φ direction"]),
     (
         "φ ring encoder (RS-422)",
         true,
         &["φ encoder clock", "φ encoder data"],
     ),
     ("φ home switch", true, &["φ home switch"]),
+    ("brakes", true, &["brakes"]),
     ("camera, other arm", true, &["trigger out", "trigger in"]),
     ("jumper: camera arm", true, &["camera arm"]),
     ("host", true, &["host: transmit", "host: receive"]),
@@ -50,9 +45,8 @@ const TOP: u32 = 56;
 /// Edges of the board.
 const BOARD: (u32, u32) = (260, 720);
 
-/// The figure, as SVG. Text is dark and ground light, so that it reads on any page.
-pub fn figure(board: &Board) -> String {
-    let all = uses(board);
+/// The figure of these uses of pins, as SVG. Text is dark and ground light, so that it reads on any page.
+pub fn figure(board: &Board, all: &[Use]) -> String {
     let mut body = String::new();
     let mut ends = [TOP; 2];
     let mut drawn = Vec::new();

@@ -120,7 +120,7 @@ pub const ROWS: &[Row] = &[
     row("homing by BiSS-C", When::Asked, motion::homing_by_biss),
     row(
         "driver's alarm and brakes",
-        When::OneBoard,
+        When::EveryBoard,
         safety::driver_alarm,
     ),
     row("reversed motor and encoder", When::Asked, motion::reversed),

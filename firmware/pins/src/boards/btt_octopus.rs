@@ -37,7 +37,7 @@ pub const BTT_OCTOPUS: Board = Board {
                 clock: wire(Pin::new('B', 3), "SPI3: SCK"),
                 data: wire(Pin::new('B', 4), "SPI3: MISO"),
             },
-            home_switch: wire(Pin::new('G', 6), "STOP_0"),
+            home_switch: wire(Pin::new('G', 12), "STOP_4"),
         },
         Axis {
             step: wire(Pin::new('G', 0), "socket MOTOR1"),
@@ -48,7 +48,7 @@ pub const BTT_OCTOPUS: Board = Board {
                 clock: wire(Pin::new('E', 12), "EXP1-5"),
                 data: wire(Pin::new('E', 13), "EXP1-6"),
             },
-            home_switch: wire(Pin::new('G', 9), "STOP_1"),
+            home_switch: wire(Pin::new('G', 13), "STOP_5"),
         },
     ],
     enables: &[
@@ -67,9 +67,16 @@ pub const BTT_OCTOPUS: Board = Board {
         channel: 2,
         is_complementary: true,
     },
-    // Every other output of TIM8 is a socket's, the SD card's or the display's.
-    brakes: None,
-    alarms: None,
+    brakes: Some(TimerOutput {
+        wire: wire(Pin::new('A', 7), "EXP2-6"),
+        channel: 1,
+        is_complementary: true,
+    }),
+    // DIAG of the modules in MOTOR0 and MOTOR1, by the board's own jumpers: low while all is well.
+    alarms: Some([
+        wire(Pin::new('G', 6), "jumper DIAG of STOP_0"),
+        wire(Pin::new('G', 9), "jumper DIAG of STOP_1"),
+    ]),
     trigger_out: TimerOutput {
         wire: wire(Pin::new('B', 5), "SPI3: MOSI"),
         channel: 2,
