@@ -113,10 +113,11 @@ pub const ROWS: &[Row] = &[
     row("home switch cut", When::Asked, motion::home_switch_cut),
     row("BiSS-C rings", When::OneBoard, motion::biss_rings),
     row(
-        "BiSS-C bit flipped on the way",
+        "BiSS-C bit flipped in mid-move",
         When::Asked,
         motion::biss_bit_flips,
     ),
+    row("homing by BiSS-C", When::Asked, motion::homing_by_biss),
     row(
         "driver's alarm and brakes",
         When::EveryBoard,

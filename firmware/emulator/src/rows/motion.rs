@@ -200,7 +200,41 @@ fn with_biss(elf: &Path) -> Result<Rig> {
     Ok(rig)
 }
 
+/// Both rings are read at rest; then a bit of φ's words flips on the way.
 pub fn biss_rings(elf: &Path) -> Result<Outcome> {
+    let mut rig = with_biss(elf)?;
+    rig.run_us(200_000)?;
+    let status = rig.status()?;
+    let is = lock(&rig.world).true_deg();
+    let off_deg = [0, 1].map(|i| f64::from(status.axes[i].encoder_udeg) * 1e-6 - is[i]);
+    ensure!(
+        status.state == ControllerState::Unhomed && off_deg.iter().all(|off| off.abs() < 0.01),
+        "{:?}, {off_deg:?}° off",
+        status.state
+    );
+    flip_lowest_bit(&rig);
+    rig.run_us(200_000)?;
+    let state = rig.status()?.state;
+    let expected = ControllerState::Fault(FaultCode::ENCODER_LOST);
+    ensure!(state == expected, "with a flipped bit it is in {state:?}");
+    let figure = format!(
+        "read at {:.3}°, {:.3}°; a flipped bit is found",
+        is[0], is[1]
+    );
+    done(rig, figure)
+}
+
+/// The lowest bit of φ's position is the wrong way round in every word from now on.
+fn flip_lowest_bit(rig: &Rig) {
+    // Rest, acknowledgement, start, control data, 17 bits before it.
+    let lowest = 2 + 7 + 2 + 17;
+    lock(&rig.world).axes[1].ring = RingKind::BissC {
+        acknowledgement: 7,
+        flips: Some(lowest),
+    };
+}
+
+pub fn homing_by_biss(elf: &Path) -> Result<Outcome> {
     let mut rig = with_biss(elf)?;
     rig.complete(&Message::Home, MOVE_US)?;
     let target_udeg = [12_000_000, -170_000_000];
@@ -217,16 +251,11 @@ pub fn biss_rings(elf: &Path) -> Result<Outcome> {
     )
 }
 
-/// One bit of φ's words is the wrong way round: never a position, so that the encoder is lost.
+/// A flipped bit in mid-move.
 pub fn biss_bit_flips(elf: &Path) -> Result<Outcome> {
     let mut rig = with_biss(elf)?;
     let id = rig.begin(&Message::Home)?;
     rig.run_us(600_000)?;
-    // The lowest bit of the position: rest, acknowledgement, start, control data, 17 bits before it.
-    let lowest = 2 + 7 + 2 + 17;
-    lock(&rig.world).axes[1].ring = RingKind::BissC {
-        acknowledgement: 7,
-        flips: Some(lowest),
-    };
+    flip_lowest_bit(&rig);
     must_fail(rig, id, FaultCode::ENCODER_LOST)
 }
