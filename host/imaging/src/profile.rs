@@ -76,6 +76,12 @@ impl LineProfile {
             rows[n] = self.row(sample, tau, (with_material, light));
             n += 1;
         }
+        // Where the pixels differ by less than the light should alone there is nothing that it falls on: a
+        // saturated frame, a lid. What the light's growth leaves of an even run is no line.
+        let differ = (outer - inner) * light.abs();
+        if light != 0.0 && !varies(&rows[..n], differ) {
+            return None;
+        }
         fit_rows(&rows[..n], with_material)
     }
 
@@ -104,6 +110,16 @@ impl LineProfile {
         }
         row
     }
+}
+
+/// Whether the pixels of a run differ by more than this share of the brightest.
+fn varies(rows: &[Row], share: f64) -> bool {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for row in rows {
+        low = low.min(row.value);
+        high = high.max(row.value);
+    }
+    high - low > share * high.abs()
 }
 
 /// Runs longer than this are cut: at 16 megapixels a window has some forty pixels.
@@ -312,6 +328,17 @@ mod tests {
         );
         assert!(with.abs() < 1e-3, "{with}");
         assert!(without.abs() > 0.02, "{without}");
+    }
+
+    #[test]
+    fn an_even_run_shows_no_line_in_whatever_light() {
+        let truth = profile(0.12, 0.8, 0.5);
+        let mut even = run(&truth, 0.0, [0.25, 0.01, 0.4]);
+        even.iter_mut().for_each(|sample| sample.value = 0.5);
+        let lit = |light: f64| LineProfile { light, ..truth }.fit(&even, |_| 0.0);
+        assert!(lit(-0.05).is_none() && lit(0.05).is_none());
+        let fit = lit(0.0).unwrap();
+        assert!(fit.gain <= 1e-12, "{}", fit.gain);
     }
 
     #[test]

@@ -15,6 +15,7 @@
 mod choose;
 mod error;
 mod light;
+mod light_off;
 mod lines;
 mod mirror;
 mod numbers;
@@ -27,9 +28,11 @@ mod unknowns;
 pub use choose::spread_poses;
 pub use error::CalibrateError;
 pub use light::LightState;
+pub(crate) use light_off::{LightOff, light_off};
 pub use mirror::MirrorFit;
 pub use numbers::{Number, NumberState, Spread};
 pub use residuals::{LineResidual, Residuals, ShadingResidual};
+pub(crate) use shading::{ReferenceValue, ShadedFrame};
 
 use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
 use crate::progress::{Cancelled, Progress, Step, step};
@@ -47,7 +50,6 @@ use mirror::{MirrorFrame, MirrorLight};
 use nalgebra::DMatrix;
 use numbers::{allow_for_kept, changes, direction_u, state_of};
 use rayon::prelude::*;
-use shading::ShadedFrame;
 use solve::{Problem, Solved, solve};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -716,4 +718,10 @@ fn table(
             state: states[k],
         })
         .collect()
+}
+
+/// Of at least one value.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
