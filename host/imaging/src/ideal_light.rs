@@ -5,6 +5,7 @@ use gonia_brdf::{Direction, Elementary, Vec3};
 use gonia_rig::{Placement, Rig};
 
 /// The rig's light over the target: a point with a smooth beam.
+#[derive(Clone, Copy, Debug)]
 pub struct IdealLight {
     placement: Placement,
     distance_mm: f64,

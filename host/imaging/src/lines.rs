@@ -1,6 +1,6 @@
 //! The neighbourhoods of the four lines: pixels along runs across each predicted line.
 
-use crate::luminance;
+use crate::{IdealLight, luminance};
 use gonia_brdf::Elementary;
 use gonia_rig::{CameraModel, Frame, Homography, Target};
 use std::f64::consts::SQRT_2;
@@ -28,6 +28,12 @@ const WINDOW_PX: f64 = 4.0;
 const SOBEL_PX: f64 = 1.0;
 /// Distance from the ends of a line (the crossings) at which stations begin, pixels.
 const CLEAR_OF_CROSSING_PX: f64 = 4.0;
+
+/// So many pixels to either side of a line the light is looked at.
+const LIGHT_PX: f64 = 1.5;
+/// Light that changes by a larger share a pixel is none that a straight line describes: it stays positive over the
+/// pixels of a fit.
+const MOST_GROWTH: f64 = 0.15;
 
 /// Places on a line at which its row is looked up, less one.
 const PLACES_A_LINE: usize = 8;
@@ -87,8 +93,16 @@ pub struct Station {
     pub s: f64,
     /// Pixels outwards a millimetre of the target.
     pub px_per_mm: f64,
+    /// By which share the light grows in a pixel outwards.
+    pub light: f64,
     /// Its samples.
     pub run: std::ops::Range<usize>,
+}
+
+/// What is across a line at one of its places.
+struct Across {
+    px_per_mm: f64,
+    light: f64,
 }
 
 /// One pixel of a run.
@@ -148,6 +162,7 @@ impl LineStrip {
         target_to_px: &Homography,
         target: &Target,
         side: Side,
+        light: &IdealLight,
         search_px: f64,
     ) -> Self {
         let a = target.line_offset_mm;
@@ -195,7 +210,21 @@ impl LineStrip {
             let across = |p: [f64; 2]| {
                 let mm = target_from_px.apply(p);
                 let d = target_to_px.jacobian(mm)[side.axis];
-                (d[0] * outward[0] + d[1] * outward[1]).abs()
+                let beside = |px: f64| {
+                    let at = [0, 1].map(|i| p[i] + px * outward[i]);
+                    light.irradiance(target_from_px.apply(at))
+                };
+                let (inner, here, outer) = (beside(-LIGHT_PX), beside(0.0), beside(LIGHT_PX));
+                let growth = (outer - inner) / (2.0 * LIGHT_PX * here);
+                let is_lit = inner > 0.0 && here > 0.0 && outer > 0.0;
+                Across {
+                    px_per_mm: (d[0] * outward[0] + d[1] * outward[1]).abs(),
+                    light: if is_lit {
+                        growth.clamp(-MOST_GROWTH, MOST_GROWTH)
+                    } else {
+                        0.0
+                    },
+                }
             };
             let reach_px = reach_px(target, step, search_px);
             strip.fill(frame, camera, reach_px, reach, across);
@@ -209,7 +238,7 @@ impl LineStrip {
         camera: &CameraModel,
         reach_px: f64,
         reach: f64,
-        px_per_mm: impl Fn([f64; 2]) -> f64,
+        across: impl Fn([f64; 2]) -> Across,
     ) {
         // Runs go down the columns under a flat line and along the rows beside a steep one.
         let main = usize::from(self.along[0].abs() < self.along[1].abs());
@@ -239,9 +268,11 @@ impl LineStrip {
                 });
             }
             if self.samples.len() > start {
+                let across = across(ideal);
                 self.stations.push(Station {
                     s: self.place(ideal).0,
-                    px_per_mm: px_per_mm(ideal),
+                    px_per_mm: across.px_per_mm,
+                    light: across.light,
                     run: start..self.samples.len(),
                 });
             }

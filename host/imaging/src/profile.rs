@@ -4,7 +4,9 @@
 //! the profile is D + L·[Φ((τ−a)/σ) − Φ((τ−b)/σ)] + M·Φ((e−τ)/σ), τ the distance from the line's
 //! middle, a and b its inner and outer edge, e the material's edge. D, L and M are free at every
 //! station, so that shading, highlights and folds cannot shift the line; the material's edge is in
-//! the model because at grazing views it comes within a pixel of the line.
+//! the model because at grazing views it comes within a pixel of the line. There a pixel is centimetres
+//! of the target, over which a near light changes by some per cent: each of the three is the blur of
+//! something lit by 1 + g·τ, with the light's growth g as the rig has it.
 
 use crate::lines::{Edges, RunSample};
 use gonia_brdf::Elementary;
@@ -23,6 +25,8 @@ pub struct LineProfile {
     pub s: f64,
     /// Standard deviation of the blur, pixels.
     pub sigma: f64,
+    /// By which share of that at the line's middle the light grows in a pixel outwards.
+    pub light: f64,
 }
 
 /// The fit of one station's amplitudes, and what it tells about the line's place and the blur.
@@ -51,6 +55,8 @@ impl LineProfile {
         let outer = far + margin;
         // A gap wide enough to stand in keeps the material out of it.
         let with_material = near - margin < edge + WINDOW_SIGMAS * self.sigma;
+        // On a dark desk a narrow line that stands alone is lit evenly.
+        let light = if with_material { self.light } else { 0.0 };
         // Little of the material: it may have a pattern of its own.
         let inner = if with_material {
             edge - MATERIAL_SIGMAS * self.sigma - 1.0
@@ -67,33 +73,53 @@ impl LineProfile {
             if n == MAX_RUN {
                 break;
             }
-            rows[n] = self.row(sample, tau, with_material);
+            rows[n] = self.row(sample, tau, (with_material, light));
             n += 1;
+        }
+        // Where the pixels differ by less than the light should alone there is nothing that it falls on: a
+        // saturated frame, a lid. What the light's growth leaves of an even run is no line.
+        let differ = (outer - inner) * light.abs();
+        if light != 0.0 && !varies(&rows[..n], differ) {
+            return None;
         }
         fit_rows(&rows[..n], with_material)
     }
 
-    fn row(&self, sample: &RunSample, tau: f64, with_material: bool) -> Row {
+    fn row(&self, sample: &RunSample, tau: f64, (with_material, light): (bool, f64)) -> Row {
         let inverse = 1.0 / self.sigma;
         let [near, far, edge] = self.edges.at(f64::from(sample.s));
         let z1 = (tau - near) * inverse;
         let z2 = (tau - far) * inverse;
         let ((c1, d1), (c2, d2)) = (normal(z1), normal(z2));
+        // The light at an edge, relative to that in the middle of the line.
+        let lit = |at: f64| 1.0 + light * at;
+        let (here, spread) = (lit(tau), light * self.sigma);
+        let (lit1, lit2) = (lit(near) * d1, lit(far) * d2);
         let mut row = Row {
             value: f64::from(sample.value),
-            basis: [c1 - c2, 1.0, 0.0],
-            slope: [(d1 - d2) * inverse, 0.0],
-            blur: [z2 * d2 - z1 * d1, 0.0],
+            basis: [here * (c1 - c2) + spread * (d1 - d2), here, 0.0],
+            slope: [(lit1 - lit2) * inverse, 0.0],
+            blur: [z2 * lit2 - z1 * lit1 + spread * (d1 - d2), 0.0],
         };
         if with_material {
             let z = (edge - tau) * inverse;
             let (c, d) = normal(z);
-            row.basis[2] = c;
-            row.slope[1] = -d * inverse;
-            row.blur[1] = -z * d;
+            row.basis[2] = here * c - spread * d;
+            row.slope[1] = -lit(edge) * d * inverse;
+            row.blur[1] = -(z * lit(edge) + spread) * d;
         }
         row
     }
+}
+
+/// Whether the pixels of a run differ by more than this share of the brightest.
+fn varies(rows: &[Row], share: f64) -> bool {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for row in rows {
+        low = low.min(row.value);
+        high = high.max(row.value);
+    }
+    high - low > share * high.abs()
 }
 
 /// Runs longer than this are cut: at 16 megapixels a window has some forty pixels.
@@ -215,6 +241,7 @@ mod tests {
             edges,
             s: 0.0,
             sigma,
+            light: 0.0,
         }
     }
 
@@ -228,7 +255,7 @@ mod tests {
                     value: 0.0,
                     pixel: [0; 2],
                 };
-                let row = profile.row(&sample, t - at, true);
+                let row = profile.row(&sample, t - at, (true, profile.light));
                 let value: f64 = (0..3).map(|i| amplitudes[i] * row.basis[i]).sum();
                 sample.value = value as f32;
                 sample
@@ -253,6 +280,65 @@ mod tests {
         }
         assert!((at - 0.37).abs() < 1e-3, "{at}");
         assert!((sigma - 0.5).abs() < 2e-3, "{sigma}");
+    }
+
+    #[test]
+    fn light_that_grows_across_a_line_does_not_move_it() {
+        // At a grazing view a pixel is centimetres wide: under a near light some per cent a pixel.
+        let truth = LineProfile {
+            light: -0.05,
+            ..profile(0.12, 0.8, 0.5)
+        };
+        // Each thin slice of the target is lit as its place is, and blurred.
+        let amplitudes = [0.27, 0.01, 0.26];
+        let [near, far, edge] = truth.edges.at(0.0);
+        let seen = |t: f64| -> f64 {
+            let slices = (-12_000..12_000).map(|k| 1e-3 * (f64::from(k) + 0.5));
+            let weighed = slices.map(|u| {
+                let line = if (near..far).contains(&u) {
+                    amplitudes[0]
+                } else {
+                    0.0
+                };
+                let material = if u < edge { amplitudes[2] } else { 0.0 };
+                let z = (t - u) / truth.sigma;
+                let blur = normal(z).1 / truth.sigma;
+                1e-3 * blur * (1.0 + truth.light * u) * (line + amplitudes[1] + material)
+            });
+            weighed.sum()
+        };
+        let mut run = run(&truth, 0.0, amplitudes);
+        for sample in &mut run {
+            sample.value = seen(f64::from(sample.t)) as f32;
+        }
+        let placed = |profile: LineProfile| {
+            let mut at = 0.0;
+            for _ in 0..6 {
+                let fit = profile.fit(&run, |_| at).unwrap();
+                at += fit.right[0] / fit.normal[0];
+            }
+            at
+        };
+        let (with, without) = (
+            placed(truth),
+            placed(LineProfile {
+                light: 0.0,
+                ..truth
+            }),
+        );
+        assert!(with.abs() < 1e-3, "{with}");
+        assert!(without.abs() > 0.02, "{without}");
+    }
+
+    #[test]
+    fn an_even_run_shows_no_line_in_whatever_light() {
+        let truth = profile(0.12, 0.8, 0.5);
+        let mut even = run(&truth, 0.0, [0.25, 0.01, 0.4]);
+        even.iter_mut().for_each(|sample| sample.value = 0.5);
+        let lit = |light: f64| LineProfile { light, ..truth }.fit(&even, |_| 0.0);
+        assert!(lit(-0.05).is_none() && lit(0.05).is_none());
+        let fit = lit(0.0).unwrap();
+        assert!(fit.gain <= 1e-12, "{}", fit.gain);
     }
 
     #[test]

@@ -210,6 +210,7 @@ impl<'a> Shown<'a> {
                     edges: strip.edges,
                     s: station.s,
                     sigma,
+                    light: station.light,
                 };
                 let fit = profile.fit(&strip.samples[station.run.clone()], shift)?;
                 shows(&fit).then_some((station, fit, 0.0))

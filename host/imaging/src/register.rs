@@ -10,6 +10,7 @@ mod line_points;
 mod mark;
 mod prior;
 
+use crate::IdealLight;
 use crate::hough::{StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES, rows_of_strips};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
@@ -55,10 +56,19 @@ const RELINEARIZE_PX: f64 = 1.5;
 /// Finds the target of one rig in frames.
 #[derive(Clone, Debug)]
 pub struct Registrar {
+    rig: Rig,
     camera: CameraModel,
     target: Target,
     prior: ImagePrior,
     hough_resolution: f64,
+}
+
+/// A frame, and what its arms let one expect in it.
+struct Shot<'a> {
+    frame: &'a Frame,
+    /// The camera arm's reading.
+    view: Direction,
+    light: IdealLight,
 }
 
 /// Where the target is in one frame.
@@ -184,6 +194,7 @@ impl Registrar {
     /// For the frames of a rig.
     pub fn new(rig: &Rig) -> Self {
         Self {
+            rig: rig.clone(),
             camera: CameraModel::new(rig),
             target: rig.target.clone(),
             prior: ImagePrior::of(rig),
@@ -202,7 +213,8 @@ impl Registrar {
     /// lines it falls back to the prediction, and says so.
     pub fn register(&self, frame: &Frame, reading: Pose) -> Registration {
         let predicted = self.camera.predict(reading.view, CameraShift::default());
-        match self.locate(frame, reading.view, &predicted) {
+        let shot = self.shot(frame, reading);
+        match self.locate(&shot, &predicted) {
             Ok((solution, _)) => match self.target_turned(frame, &solution.homography) {
                 None => self.locked(reading, solution),
                 Some(turn) => {
@@ -211,7 +223,7 @@ impl Registrar {
                 }
             },
             Err(mut failure) => {
-                failure.reason = self.explain(frame, reading.view, &predicted, failure.reason);
+                failure.reason = self.explain(&shot, &predicted, failure.reason);
                 // Kept by its pose, a frame must not show a turned target either.
                 if let RegistrationFailure::LinesMissing { .. } = failure.reason
                     && let Some(turn) = self.target_turned(frame, &predicted)
@@ -257,7 +269,7 @@ impl Registrar {
         if !covers(&predicted) {
             return None;
         }
-        let (solution, about) = self.locate(frame, reading.view, &predicted).ok()?;
+        let (solution, about) = self.locate(&self.shot(frame, reading), &predicted).ok()?;
         // Lines far from their prediction were measured again about a better one.
         let is_whole = covers(&about) && covers(&solution.homography);
         let is_turned = || self.target_turned(frame, &solution.homography).is_some();
@@ -324,17 +336,24 @@ impl Registrar {
         }
     }
 
+    fn shot<'a>(&self, frame: &'a Frame, reading: Pose) -> Shot<'a> {
+        Shot {
+            frame,
+            view: reading.view,
+            light: IdealLight::new(&self.rig, reading.light),
+        }
+    }
+
     /// Where the lines are, and the map about which they were looked for at last.
     fn locate(
         &self,
-        frame: &Frame,
-        view: Direction,
+        shot: &Shot<'_>,
         predicted: &Homography,
     ) -> Result<(Solution, Homography), Failure> {
-        let solution = self.solve(frame, view, predicted)?;
+        let solution = self.solve(shot, predicted)?;
         if solution.furthest_px > RELINEARIZE_PX {
             let about = solution.homography;
-            return Ok((self.solve(frame, view, &about)?, about));
+            return Ok((self.solve(shot, &about)?, about));
         }
         Ok((solution, predicted.clone()))
     }
@@ -352,14 +371,9 @@ impl Registrar {
             .map(|strip| strongest_line(frame, strip, half_width, search_px, self.hough_resolution))
     }
 
-    fn solve(
-        &self,
-        frame: &Frame,
-        view: Direction,
-        predicted: &Homography,
-    ) -> Result<Solution, Failure> {
-        let width = frame.width as f64;
-        let strips = self.strips(frame, predicted, NEAR_WIDTHS * width + 4.0);
+    fn solve(&self, shot: &Shot<'_>, predicted: &Homography) -> Result<Solution, Failure> {
+        let (view, width) = (shot.view, shot.frame.width as f64);
+        let strips = self.strips(shot, predicted, NEAR_WIDTHS * width + 4.0);
         let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
         if fit.lines.iter().all(Option::is_some) {
             let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
@@ -369,8 +383,8 @@ impl Registrar {
             }
         }
         let search_px = SEARCH_WIDTHS * width + 4.0;
-        let strips = self.strips(frame, predicted, search_px);
-        let hough = self.hough(frame, &strips, search_px);
+        let strips = self.strips(shot, predicted, search_px);
+        let hough = self.hough(shot.frame, &strips, search_px);
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the fiducial lines beside them.
             let again = self.search(view, &strips, [None; 4]);
@@ -383,14 +397,15 @@ impl Registrar {
     }
 
     /// The neighbourhoods of the four lines, `search_px` to either side.
-    fn strips(&self, frame: &Frame, predicted: &Homography, search_px: f64) -> [LineStrip; 4] {
+    fn strips(&self, shot: &Shot<'_>, predicted: &Homography, search_px: f64) -> [LineStrip; 4] {
         SIDES.map(|side| {
             LineStrip::cut(
-                frame,
+                shot.frame,
                 &self.camera,
                 predicted,
                 &self.target,
                 side,
+                &shot.light,
                 search_px,
             )
         })

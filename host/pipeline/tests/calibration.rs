@@ -75,6 +75,9 @@ fn without_a_reference_the_light_stays_and_is_said_to() {
     );
     assert_eq!(found.rig.light, nominal(160).light);
     assert!(found.numbers.iter().all(|n| !n.name.starts_with("light")));
+    // What is not known is not said to be: the light's direction is as uncertain as its arm's zeros.
+    let [light, _] = found.direction_u;
+    assert!(light.p50 > 1.2 && light.p50 < 3.0, "{light:?}");
     assert!(
         errors(&found.rig, &truth)[1][1] < 0.1,
         "{}",

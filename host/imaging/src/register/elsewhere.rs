@@ -3,13 +3,13 @@
 use super::prior::ARM_DEG;
 use super::{
     Estimate, MAX_SURPRISE, MIN_LINES, NEAR_WIDTHS, Registrar, RegistrationFailure, SEARCH_WIDTHS,
-    Trust,
+    Shot, Trust,
 };
 use crate::lines::LineStrip;
 use crate::refine::{LineFit, Starts, fit_lines};
 use crate::turn::Turn;
-use gonia_brdf::{Direction, Elementary};
-use gonia_rig::{CameraShift, Frame, Homography, Target};
+use gonia_brdf::Elementary;
+use gonia_rig::{CameraShift, Homography, Target};
 
 /// Standard deviation of the roll of a camera that is not mounted as rig.toml says.
 const LOOSE_ROLL_DEG: f64 = 1.0;
@@ -27,12 +27,11 @@ impl Registrar {
     /// A failure, or what is behind it where the whole target is elsewhere.
     pub(super) fn explain(
         &self,
-        frame: &Frame,
-        view: Direction,
+        shot: &Shot<'_>,
         predicted: &Homography,
         failure: RegistrationFailure,
     ) -> RegistrationFailure {
-        if let Some(turn) = self.turned(frame, view, predicted) {
+        if let Some(turn) = self.turned(shot, predicted) {
             return RegistrationFailure::Turned(turn);
         }
         if let RegistrationFailure::FarFromPose { .. } = failure {
@@ -41,7 +40,7 @@ impl Registrar {
         // A target that is moved along two of its lines shows those two in their places.
         let found = [SEARCH_WIDTHS, FAR_WIDTHS]
             .into_iter()
-            .find_map(|within| self.displacement(frame, view, predicted, within));
+            .find_map(|within| self.displacement(shot, predicted, within));
         match found {
             Some(by) => {
                 // What moves the fiducial lines most.
@@ -67,22 +66,26 @@ impl Registrar {
     /// How a frame in which the lines are not where they should be was turned, when they are once it is
     /// turned back. A square target straight from above, or along an axis of its symmetry, is the same either
     /// way: there nothing is said.
-    fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
-        let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
-        let size_px = [frame.width, frame.height].map(|px| px as f64);
+    fn turned(&self, shot: &Shot<'_>, predicted: &Homography) -> Option<Turn> {
+        let near_px = NEAR_WIDTHS * shot.frame.width as f64 + 4.0;
+        let size_px = [shot.frame.width, shot.frame.height].map(|px| px as f64);
         Turn::ALL.into_iter().find(|turn| {
             if moves_by_px(*turn, predicted, &self.target, size_px) < near_px {
                 return false;
             }
-            let Some(as_taken) = turn.undo(frame) else {
+            let Some(frame) = turn.undo(shot.frame) else {
                 return false;
+            };
+            let as_taken = Shot {
+                frame: &frame,
+                ..*shot
             };
             let strips = self.strips(&as_taken, predicted, near_px);
             let lines = fit_lines(&strips, &Starts::Predicted, &self.target).lines;
             // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
             lines.iter().all(Option::is_some)
                 && self
-                    .estimate(view, &strips, &lines, &self.trust(ARM_DEG))
+                    .estimate(shot.view, &strips, &lines, &self.trust(ARM_DEG))
                     .surprise
                     <= MAX_SURPRISE
         })
@@ -92,8 +95,7 @@ impl Registrar {
     /// camera whose image is moved (and turned a little) must see all four lines.
     fn displacement(
         &self,
-        frame: &Frame,
-        view: Direction,
+        shot: &Shot<'_>,
         predicted: &Homography,
         within_widths: f64,
     ) -> Option<CameraShift> {
@@ -107,7 +109,7 @@ impl Registrar {
             roll: guess.roll,
             ..CameraShift::default()
         };
-        let found = self.elsewhere(frame, view, predicted, within_widths, (&trust, &moved))?;
+        let found = self.elsewhere(shot, predicted, within_widths, (&trust, &moved))?;
         Some(found.estimate.shift)
     }
 
@@ -115,16 +117,15 @@ impl Registrar {
     /// them. `taken` says what of a first guess is taken for where they are looked at closely.
     pub(super) fn elsewhere(
         &self,
-        frame: &Frame,
-        view: Direction,
+        shot: &Shot<'_>,
         predicted: &Homography,
         within_widths: f64,
         (trust, taken): (&Trust, &dyn Fn(CameraShift) -> CameraShift),
     ) -> Option<Elsewhere> {
-        let width = frame.width as f64;
+        let (view, width) = (shot.view, shot.frame.width as f64);
         let search_px = within_widths * width + 4.0;
-        let strips = self.strips(frame, predicted, search_px);
-        let hough = self.hough(frame, &strips, search_px);
+        let strips = self.strips(shot, predicted, search_px);
+        let hough = self.hough(shot.frame, &strips, search_px);
         let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
         // One of them may be something else's.
         let choices = (0..=4).map(|out| {
@@ -140,7 +141,7 @@ impl Registrar {
             }
             let guess = taken(self.estimate(view, &strips, &some, trust).shift);
             let there = self.camera.predict(view, guess);
-            let strips = self.strips(frame, &there, NEAR_WIDTHS * width + 4.0);
+            let strips = self.strips(shot, &there, NEAR_WIDTHS * width + 4.0);
             let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
             let estimate = self.estimate(view, &strips, &fit.lines, trust);
             let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;

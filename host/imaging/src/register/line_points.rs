@@ -5,7 +5,7 @@ use super::elsewhere::Elsewhere;
 use super::{MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
 use crate::lines::SIDES;
 use crate::refine::{Starts, fit_lines, pieces};
-use gonia_brdf::{Direction, Elementary};
+use gonia_brdf::{Elementary, Pose};
 use gonia_rig::{CameraShift, Frame};
 
 /// Pieces of a line.
@@ -40,19 +40,19 @@ pub enum Search {
 impl Registrar {
     /// The pieces of the lines that a frame shows; none where the target cannot be recognised. With
     /// [`Search::Near`] some lines may be missing; the other searches want all four.
-    pub fn line_points(&self, frame: &Frame, view: Direction, search: Search) -> Vec<LinePoint> {
-        let predicted = self.camera.predict(view, CameraShift::default());
+    pub fn line_points(&self, frame: &Frame, reading: Pose, search: Search) -> Vec<LinePoint> {
+        let predicted = self.camera.predict(reading.view, CameraShift::default());
+        let shot = self.shot(frame, reading);
         let width = frame.width as f64;
         let (strips, fit) = match search {
             Search::Near => {
-                let strips = self.strips(frame, &predicted, NEAR_WIDTHS * width + 4.0);
+                let strips = self.strips(&shot, &predicted, NEAR_WIDTHS * width + 4.0);
                 let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
                 (strips, fit)
             }
             Search::Far | Search::About => {
                 let (within_widths, trust) = loose(search, width);
-                let found =
-                    self.elsewhere(frame, view, &predicted, within_widths, (&trust, &|all| all));
+                let found = self.elsewhere(&shot, &predicted, within_widths, (&trust, &|all| all));
                 let Some(Elsewhere { strips, fit, .. }) = found else {
                     return Vec::new();
                 };

@@ -1,7 +1,7 @@
 //! Lines in photographs by a real camera: its noise, its compression, its lens.
 
 use super::*;
-use gonia_brdf::Elementary;
+use gonia_brdf::{Elementary, Pose};
 use gonia_rig::{CameraGeometry, TargetPlace};
 
 /// The edges of five squares by five, as if the target's lines ran along them.
@@ -117,7 +117,8 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
         });
         let predicted = Homography::from_corners(&outer, &pointed_at).unwrap();
         let search_px = SEARCH_WIDTHS * frame.width as f64 + 4.0;
-        let strips = registrar.strips(&frame, &predicted, search_px);
+        let shot = registrar.shot(&frame, Pose::from_deg([0.0; 4]));
+        let strips = registrar.strips(&shot, &predicted, search_px);
         let hough = strips.each_ref().map(|strip| {
             strongest_line(
                 &frame,

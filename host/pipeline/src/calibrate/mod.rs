@@ -3,7 +3,8 @@
 //! 1. The four lines are found in a few frames, from far off, and one least squares makes a first camera.
 //! 2. With it they are found in more frames, more closely.
 //! 3. With that, in all chosen frames to hundredths of a pixel. Camera, camera arm and target follow from
-//!    the lines of all frames together; values of the reference's grid points are read.
+//!    the lines of all frames together; values of the reference's grid points are read. Where their shading
+//!    shows a beam, the lines are found once more in its light.
 //! 4. The light and its arm follow from the shading on the reference. Lines say where the target is;
 //!    shading takes that from them, with its uncertainty, and does not change it: a reference that is not
 //!    quite what it is thought to be then spoils no camera.
@@ -91,7 +92,7 @@ pub struct Calibrated {
     pub mirror: Option<MirrorFit>,
     /// By how much directions of light and view changed, degrees, over the frames.
     pub changes: [Spread; 2],
-    /// Their standard uncertainties now, degrees.
+    /// Their standard uncertainties now, degrees; of a light that was left as it was, what was thought possible.
     pub direction_u: [Spread; 2],
     /// Standard deviation of the camera arm's θ and φ from frame to frame, degrees.
     pub camera_arm_deg: [f64; 2],
@@ -119,8 +120,9 @@ pub fn calibrate(
         });
     }
     let seen = step(progress, Step::FindingLines, |tell| {
-        let look = Look::new(rig, source, rows.len() + SECOND + FIRST, tell);
-        find_lines(rig, &rows, &look)
+        let look = Look::new(rig, source, 2 * rows.len() + SECOND + FIRST, tell);
+        let seen = find_lines(rig, &rows, &look)?;
+        look_again(rig, &rows, seen, &look)
     })?;
     step(progress, Step::SolvingGeometry, |_| {
         conclude(rig, rows.len(), seen)
@@ -128,6 +130,7 @@ pub fn calibrate(
 }
 
 /// What all chosen frames show.
+#[derive(Clone)]
 struct Seen {
     lines: Vec<LineFrame>,
     shaded: Vec<ShadedFrame>,
@@ -200,7 +203,7 @@ impl<'a> Look<'a> {
         let looked = self.each(rows, |row, frame| {
             let found = searches
                 .iter()
-                .map(|search| registrar.line_points(frame, row.pose.view, *search))
+                .map(|search| registrar.line_points(frame, row.pose, *search))
                 .find(|points| !points.is_empty());
             found.map(|points| LineFrame {
                 row: row.clone(),
@@ -238,7 +241,7 @@ fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, Cal
     let registrar = Registrar::new(&camera);
     let (sampler, grid) = (FrameSampler::new(&camera), SamplingGrid::new(&camera));
     let looked = look.each(rows, |row, frame| {
-        let points = registrar.line_points(frame, row.pose.view, Search::Near);
+        let points = registrar.line_points(frame, row.pose, Search::Near);
         let orientation = registrar.orientation(frame, row.pose.view);
         let sampled = (row.role == Role::Reference && !points.is_empty())
             .then(|| sampler.sample(frame, row, Hidden::Find))
@@ -261,6 +264,31 @@ fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, Cal
         }
     })?;
     gather(looked)
+}
+
+/// Lines that lie beside a material are placed by the light that falls on both: where the light has a beam that
+/// is not in the rig, they are looked at once more, with the light that the frames show.
+fn look_again(
+    rig: &Rig,
+    rows: &[FrameRow],
+    mut seen: Seen,
+    look: &Look<'_>,
+) -> Result<Seen, CalibrateError> {
+    // Without shading there is no light to be found.
+    if seen.shaded.is_empty() {
+        return Ok(seen);
+    }
+    // What keeps these frames from a calibration is said when they are concluded from.
+    let Ok(found) = conclude(rig, rows.len(), seen.clone()) else {
+        return Ok(seen);
+    };
+    if found.rig.light.beam == rig.light.beam {
+        return Ok(seen);
+    }
+    let had = |row: &FrameRow| seen.lines.iter().any(|line| line.row == *row);
+    let rows: Vec<FrameRow> = rows.iter().filter(|row| had(row)).cloned().collect();
+    seen.lines = look.lines(&found.rig, &rows, &[Search::Near])?;
+    Ok(seen)
 }
 
 /// What one frame shows.
@@ -613,7 +641,10 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         shared.extend_from_slice(&light.shared);
         covariance = light.covariance.clone();
     }
-    let direction_u = direction_u(rig, &unknowns, &shared, &covariance, &poses);
+    let direction_u = match light.solution() {
+        Some(_) => direction_u(rig, &unknowns, &shared, &covariance, &poses),
+        None => direction_u_of_light_as_it_was(rig, &shared, &covariance, &poses),
+    };
     let median = |rig: &Rig| Spread::of(lines.iter().map(|f| misfit_px(rig, f)).collect()).p50;
     let calibration = record(&numbers, lines.len(), seen.checksum, shared, &covariance);
     Ok(Calibrated {
@@ -636,6 +667,23 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
             ..found
         },
     })
+}
+
+/// Standard uncertainties of directions where the light stays as it was: nobody knows more of it than before.
+fn direction_u_of_light_as_it_was(
+    rig: &Rig,
+    camera: &[f64],
+    covariance: &DMatrix<f64>,
+    poses: &[Pose],
+) -> [Spread; 2] {
+    let numbers = [camera, &values(&LIGHT, rig)].concat();
+    let (n, all) = (camera.len(), numbers.len());
+    let mut joined = DMatrix::zeros(all, all);
+    joined.view_mut((0, 0), (n, n)).copy_from(covariance);
+    for (k, prior) in priors(&LIGHT, rig).into_iter().enumerate() {
+        joined[(n + k, n + k)] = prior * prior;
+    }
+    direction_u(rig, &[&CAMERA, &LIGHT], &numbers, &joined, poses)
 }
 
 /// The calibration as `rig.toml` keeps it, without its date.

@@ -77,7 +77,17 @@ struct Reduced {
     /// To find its own numbers once the shared ones have moved: own step = start − coupling · step.
     start: DVector<f64>,
     coupling: DMatrix<f64>,
-    own_variance: DVector<f64>,
+    /// Of its own numbers where the shared ones are known, in units of their variances.
+    variance_alone: DVector<f64>,
+}
+
+impl Reduced {
+    /// The variance of one of its own numbers. The shared ones are not known either, and took some of the frames'
+    /// scatter for themselves: without their part it would seem too small.
+    fn own_variance(&self, j: usize, free: &[usize], covariance: &DMatrix<f64>) -> f64 {
+        let follows = DVector::from_fn(free.len(), |k, _| self.coupling[(j, free[k])]);
+        self.variance_alone[j] + follows.dot(&(covariance * &follows))
+    }
 }
 
 /// Solves a problem from `start`. `None` when the equations have no solution (a number that is not one).
@@ -97,7 +107,8 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
         }
         let among = DMatrix::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
         let aim = DVector::from_fn(free.len(), |i, _| right[free[i]]);
-        let found = among.cholesky()?.solve(&aim);
+        let factor = among.cholesky()?;
+        let found = factor.solve(&aim);
         let longest = found.amax();
         if !longest.is_finite() {
             return None;
@@ -116,13 +127,12 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
         noise = noise_of(frames, &shared, &own)?.max(problem.least_noise);
         let had = own_sd.clone();
         if problem.finds_noise && round >= BEFORE_NOISE {
+            let covariance = factor.inverse();
             for (j, sd) in own_sd.iter_mut().enumerate() {
-                let mean = own
-                    .iter()
-                    .zip(&reduced)
-                    .map(|(own, frame)| own[j] * own[j] + frame.own_variance[j] * had[j] * had[j])
-                    .sum::<f64>()
-                    / own.len() as f64;
+                let square = |(own, frame): (&Vec<f64>, &Reduced)| {
+                    own[j] * own[j] + frame.own_variance(j, &free, &covariance) * had[j] * had[j]
+                };
+                let mean = own.iter().zip(&reduced).map(square).sum::<f64>() / own.len() as f64;
                 *sd = mean.sqrt().max(problem.least_own[j]);
             }
         }
@@ -235,7 +245,7 @@ fn reduce(
         right: -(by_shared.transpose() * &residuals) - mixed.transpose() * &start,
         start,
         coupling,
-        own_variance: inverse.diagonal(),
+        variance_alone: inverse.diagonal(),
     }
 }
 
