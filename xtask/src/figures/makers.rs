@@ -259,6 +259,10 @@ pub const FIGURES: &[Figure] = &[
         GONIA,
         prepare("motion/jerk.csv", "gonia chart --motion --out {work}/motion"),
     ]),
+    figure("arms", 5.0, Csv("motion/arms.csv"), &[
+        GONIA,
+        prepare("motion/jerk.csv", "gonia chart --motion --out {work}/motion"),
+    ]),
     figure("pointing", 0.7, Text, &[run(
         "cargo test --release -p gonia-tests --test controllers_session -- --ignored --nocapture",
     )]),
