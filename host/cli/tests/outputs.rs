@@ -9,7 +9,7 @@ mod common;
 use cases::{Case, document};
 use common::{gonia, gonia_ok, text};
 use gonia_brdf::model::{Brdf, Kurt};
-use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
+use gonia_brdf::{DenseBrdf, Direction, Elementary, Grid, Sample};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::dense::{read_dense, read_dense_channels, write_dense};
 use gonia_formats::rig_toml::write_rig;
