@@ -32,7 +32,7 @@ impl FaultCode {
     pub const NOT_REACHED: Self = Self(4);
     /// The home switch was not found within the whole travel.
     pub const HOME_NOT_FOUND: Self = Self(5);
-    /// The home switch stayed closed after backing off.
+    /// The home switch still said home after backing off.
     pub const HOME_SWITCH_STUCK: Self = Self(6);
     /// The switch and the encoder disagree about where home is.
     pub const HOME_MISMATCH: Self = Self(7);
@@ -47,9 +47,13 @@ impl FaultCode {
     pub const SETTINGS_NOT_SAVED: Self = Self(11);
     /// At rest, steps and encoder, both counted from home, differ by more than the step-loss limit.
     pub const STEP_LOSS: Self = Self(12);
+    /// The home switch lets go again below home: it says home on more than one turn.
+    pub const HOME_AMBIGUOUS: Self = Self(13);
+    /// A motor's driver reports an alarm.
+    pub const DRIVER_ALARM: Self = Self(14);
 
     /// Every fault that exists, in the order of its number.
-    pub const PAGES: [FaultPage; 12] = [
+    pub const PAGES: [FaultPage; 14] = [
         page(
             Self::ENCODER_LOST,
             "encoder does not answer",
@@ -77,14 +81,14 @@ impl FaultCode {
         page(
             Self::HOME_NOT_FOUND,
             "home switch not found",
-            "switch unplugged, or arm blocked short of it",
+            "switch moved or its cable shorted (cut, where it is normally open), or arm blocked short of it",
             "check the switch's cable and the way to it, clear the fault, home",
         ),
         page(
             Self::HOME_SWITCH_STUCK,
-            "home switch stays closed",
-            "switch jammed or its cable shorted",
-            "free or replace the switch, clear the fault, home",
+            "home switch says home above it too",
+            "switch jammed, its cable cut or unplugged (shorted, where it is normally open), or home_normally_closed not what the switch is",
+            "free or replace the switch, check its cable and home_normally_closed, clear the fault, home",
         ),
         page(
             Self::HOME_MISMATCH,
@@ -121,6 +125,18 @@ impl FaultCode {
             "steps and encoder differ at rest by more than step_loss_limit",
             "steps lost, gear slipped, more backlash than backlash_takeup, or an encoder that shifted or was never calibrated",
             "clear the fault, home: the switch shows which is right; if it returns, calibrate the encoder or raise backlash_takeup",
+        ),
+        page(
+            Self::HOME_AMBIGUOUS,
+            "home switch lets go below home, so that it does not show the turn",
+            "a cam that works the switch once a turn, on an axis that travels a turn or more",
+            "fit a switch that says home from there down, or lower soft_max until the travel from home_angle is shorter than a turn less home_probe; clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_ALARM,
+            "motor's driver reports an alarm; brakes engaged, drivers switched off",
+            "driver too hot, overcurrent, motor cable, supply missing; or the alarm's cable cut",
+            "see what the driver shows, mend that, clear the fault, home",
         ),
     ];
 

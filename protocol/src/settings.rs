@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 32;
+pub const N_SETTINGS: usize = 37;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ pub enum Key {
     SoftMin = 3,
     /// Highest target, µdeg.
     SoftMax = 4,
-    /// Angle at which the home switch closes, coming from above, µdeg.
+    /// Angle at which the home switch says so, coming from above, µdeg.
     HomeAngle = 5,
     /// How far switch and encoder may differ, µdeg: what a good switch repeats to. Where it is wider
     /// than the pointing limit, an encoder that has shifted is taken for right.
@@ -107,6 +107,19 @@ pub enum Key {
     MotorReversed = 30,
     /// 1 where the encoder counts up when the axis turns down.
     EncoderReversed = 31,
+    /// Wider than a cam that works the home switch once a turn, µdeg: an axis that can travel a turn drives so
+    /// far below home to see that the switch still says so. It must turn freely there.
+    HomeProbe = 32,
+    /// 1 where the home switch is normally closed: its contact opens at home, so that a cut wire reads as home,
+    /// which homing finds out. 0: it closes there.
+    HomeNormallyClosed = 33,
+    /// The driver's alarm output: 0 for none, 1 where its contact is closed while all is well (a cut wire is an
+    /// alarm), 2 where it closes for an alarm.
+    DriverAlarm = 34,
+    /// How long a brake takes to engage or to let go, µs; 0 where none is fitted. Of the node.
+    BrakeTime = 35,
+    /// What the encoder speaks: 0 for SSI, 1 for BiSS-C.
+    EncoderKind = 36,
 }
 
 /// What a key means.
@@ -300,6 +313,23 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     map(Key::GearSin, "gear_sin"),
     m(Key::MotorReversed, "motor_reversed", "", (0, 1), [0; 2]),
     m(Key::EncoderReversed, "encoder_reversed", "", (0, 1), [0; 2]),
+    m(
+        Key::HomeProbe,
+        "home_probe",
+        "µdeg",
+        (500_000, 90 * DEG),
+        [5 * DEG; 2],
+    ),
+    m(
+        Key::HomeNormallyClosed,
+        "home_normally_closed",
+        "",
+        (0, 1),
+        [1; 2],
+    ),
+    m(Key::DriverAlarm, "driver_alarm", "", (0, 2), [0; 2]),
+    m(Key::BrakeTime, "brake_time", "µs", (0, 1_000_000), [0; 2]),
+    m(Key::EncoderKind, "encoder_kind", "", (0, 1), [0; 2]),
 ];
 
 /// An amplitude of an error.
@@ -353,7 +383,7 @@ impl Key {
 
     /// Whether both axes of a node share one value.
     pub fn is_of_the_node(self) -> bool {
-        matches!(self, Key::HostWatchdog | Key::Telemetry)
+        matches!(self, Key::HostWatchdog | Key::Telemetry | Key::BrakeTime)
     }
 
     /// Its value on a new board.

@@ -1,6 +1,6 @@
 //! Two axes behind the firmware's hardware trait: everything that one controller is wired to.
 
-use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
 use gonia_firmware::profile::TICKS_PER_US;
 use gonia_firmware::steps::{End, Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
 use gonia_firmware::store::{RECORD_MAX, Sectors, Store, Stored};
@@ -22,6 +22,11 @@ pub struct SimulatedArm {
     has_fallen: bool,
     holds_interlock_open: bool,
     interlock_closed: bool,
+    drivers_on: bool,
+    brakes_released: bool,
+    was_let_fall: bool,
+    /// Until when each driver reports an alarm, µs.
+    alarm_until_us: [u64; 2],
     store: Store,
     flash: RamFlash,
 }
@@ -112,6 +117,10 @@ impl SimulatedArm {
             has_fallen: false,
             holds_interlock_open: false,
             interlock_closed: true,
+            drivers_on: false,
+            brakes_released: false,
+            was_let_fall: false,
+            alarm_until_us: [0; 2],
             store: Store::default(),
             flash: RamFlash {
                 sectors: [[0xFF; RECORD_MAX]; 2],
@@ -140,6 +149,7 @@ impl SimulatedArm {
     /// Lets the time pass up to now: the steps that were due by then are given.
     pub fn set_now(&mut self, now_us: u64) {
         self.now_us = now_us;
+        self.power_motors();
         if self.trigger && now_us >= self.pulse_ends_us {
             self.end_pulse();
         }
@@ -195,11 +205,37 @@ impl SimulatedArm {
         core::mem::take(&mut self.flash.has_died)
     }
 
+    /// The driver of an axis takes its motor's current away and reports an alarm until then.
+    pub fn raise_alarm_until(&mut self, axis: Axis, until_us: u64) {
+        self.alarm_until_us[axis.index()] = until_us;
+    }
+
+    /// Whether the drivers were ever switched off, or not yet on, while the brakes were let go: nothing held
+    /// the arm.
+    pub fn was_let_fall(&self) -> bool {
+        self.was_let_fall
+    }
+
+    /// Whether the brakes are let go, and whether the drivers have their current.
+    pub fn brakes_and_drivers(&self) -> (bool, bool) {
+        (self.brakes_released, self.drivers_on)
+    }
+
+    fn power_motors(&mut self) {
+        self.was_let_fall |= self.brakes_released && !self.drivers_on;
+        for (plant, alarm_until_us) in self.axes.iter_mut().zip(self.alarm_until_us) {
+            let has_alarm = self.now_us < alarm_until_us;
+            plant.let_turn(self.drivers_on && self.brakes_released && !has_alarm);
+        }
+    }
+
     /// Outputs fall back to what they are without a controller.
     pub fn reset_outputs(&mut self) {
         self.has_fallen |= self.trigger;
         self.trigger = false;
         self.holds_interlock_open = false;
+        self.drivers_on = false;
+        self.brakes_released = false;
         self.steps = [0; 2].map(|_| VirtualTimer::at_rest(self.now_us));
     }
 }
@@ -219,7 +255,7 @@ impl Hardware for SimulatedArm {
         self.steps[axis.index()].halt();
     }
 
-    fn encoder_counts(&mut self, axis: Axis, _: u32) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, axis: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
         let now_us = self.now_us;
         self.axes[axis.index()]
             .encoder_counts(now_us)
@@ -229,6 +265,21 @@ impl Hardware for SimulatedArm {
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
         let now_us = self.now_us;
         self.axes[axis.index()].switch_closed(now_us)
+    }
+
+    fn alarm_closed(&mut self, axis: Axis) -> bool {
+        // Closed while all is well.
+        self.now_us >= self.alarm_until_us[axis.index()]
+    }
+
+    fn switch_drivers(&mut self, on: bool) {
+        self.drivers_on = on;
+        self.power_motors();
+    }
+
+    fn release_brakes(&mut self, released: bool) {
+        self.brakes_released = released;
+        self.power_motors();
     }
 
     fn interlock_closed(&mut self) -> bool {

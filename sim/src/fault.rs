@@ -89,12 +89,24 @@ pub enum Fault {
         /// By how much.
         udeg: f64,
     },
-    /// The home switch's reading stays the same whatever happens; `None` ends that.
+    /// What the home switch says stays the same wherever the axis is; `None` ends that.
     SwitchStuck {
         /// Of which axis.
         axis: Axis,
-        /// The reading.
-        reading: Option<bool>,
+        /// Whether it says home.
+        at_home: Option<bool>,
+    },
+    /// The cable of the home switch is cut.
+    SwitchCut {
+        /// Of which axis.
+        axis: Axis,
+    },
+    /// The driver takes its motor's current away and reports an alarm, for so long.
+    DriverAlarm {
+        /// Of which axis.
+        axis: Axis,
+        /// How long, µs.
+        for_us: u64,
     },
     /// Readings of the encoder scatter, by so much (standard deviation).
     EncoderNoise {

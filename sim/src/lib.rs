@@ -33,3 +33,6 @@ pub mod scene;
 pub mod wire;
 #[cfg(feature = "std")]
 mod world;
+
+#[cfg(test)]
+mod controller_tests;

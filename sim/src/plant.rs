@@ -45,12 +45,41 @@ pub struct PlantConfig {
     pub eccentricity_udeg: f64,
     /// Where that error is zero.
     pub eccentricity_phase_udeg: f64,
-    /// The switch is closed at and below this angle.
+    /// The home switch works at this angle, coming from above.
     pub home_udeg: f64,
+    /// Where else it works.
+    pub home_cam: HomeCam,
+    /// The contact of the home switch opens at home: normally closed.
+    pub home_opens: bool,
     /// How long the switch chatters after it changes, µs.
     pub bounce_us: u64,
     /// Where the shaft stands at first.
     pub start_udeg: f64,
+}
+
+/// What the home switch runs on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HomeCam {
+    /// A dog that the axis takes along over its whole travel: at home it works the switch, and everywhere below.
+    Below,
+    /// A cam on the shaft: it works the switch over so much, and so once every turn.
+    EveryTurn {
+        /// How wide it is, µdeg.
+        width_udeg: f64,
+    },
+}
+
+impl HomeCam {
+    /// Whether it works the switch of an axis that stands so far above home, µdeg.
+    fn works(self, above_home_udeg: f64) -> bool {
+        match self {
+            HomeCam::Below => above_home_udeg <= 0.0,
+            HomeCam::EveryTurn { width_udeg } => {
+                let below_udeg = -above_home_udeg;
+                below_udeg - 360e6 * libm::floor(below_udeg / 360e6) <= width_udeg
+            }
+        }
+    }
 }
 
 impl PlantConfig {
@@ -79,6 +108,8 @@ impl PlantConfig {
             eccentricity_udeg: 4_000.0,
             eccentricity_phase_udeg: 0.0,
             home_udeg,
+            home_cam: HomeCam::Below,
+            home_opens: true,
             bounce_us: 3_000,
             start_udeg,
         }
@@ -110,7 +141,7 @@ pub struct AxisPlant {
     rate: f64,
     swing: Swing,
     last_step_us: u64,
-    switch_closed: bool,
+    at_home: bool,
     switch_chatters_until_us: u64,
     stalled_until_us: u64,
     encoder_lost_until_us: u64,
@@ -118,6 +149,9 @@ pub struct AxisPlant {
     extra_noise_udeg: f64,
     noisy_until_us: u64,
     switch_stuck: Option<bool>,
+    switch_is_cut: bool,
+    /// The motor has its current, and no brake holds it.
+    can_turn: bool,
     lost_cycles: u32,
 }
 
@@ -133,7 +167,7 @@ impl AxisPlant {
             rate: 0.0,
             swing: Swing::new(config.ring_hz, config.ring_decay_s),
             last_step_us: 0,
-            switch_closed: config.start_udeg <= config.home_udeg,
+            at_home: config.home_cam.works(config.start_udeg - config.home_udeg),
             switch_chatters_until_us: 0,
             stalled_until_us: 0,
             encoder_lost_until_us: 0,
@@ -141,9 +175,16 @@ impl AxisPlant {
             extra_noise_udeg: 0.0,
             noisy_until_us: 0,
             switch_stuck: None,
+            switch_is_cut: false,
+            can_turn: true,
             lost_cycles: 0,
             config,
         }
+    }
+
+    /// What it is made of.
+    pub fn config(&self) -> &PlantConfig {
+        &self.config
     }
 
     /// The driver gets a step.
@@ -151,7 +192,7 @@ impl AxisPlant {
         let direction = if forward { 1.0 } else { -1.0 };
         let interval_us = (at_us.saturating_sub(self.last_step_us)).max(1);
         self.last_step_us = at_us;
-        if at_us < self.stalled_until_us {
+        if at_us < self.stalled_until_us || !self.can_turn {
             return;
         }
         let rate = direction * 1e6 / interval_us as f64;
@@ -195,20 +236,27 @@ impl AxisPlant {
         Some((counts as i64).rem_euclid(i64::from(config.encoder_counts)) as u32)
     }
 
-    /// The home switch's reading.
+    /// Whether the contact of the home switch is closed.
     pub fn switch_closed(&mut self, now_us: u64) -> bool {
-        if let Some(stuck) = self.switch_stuck {
-            return stuck;
+        if self.switch_is_cut {
+            return false;
         }
-        let closed = self.output_udeg + self.slipped_udeg <= self.config.home_udeg;
-        if closed != self.switch_closed {
-            self.switch_closed = closed;
+        if let Some(stuck) = self.switch_stuck {
+            return stuck != self.config.home_opens;
+        }
+        let stands_udeg = self.output_udeg + self.slipped_udeg;
+        let at_home = self
+            .config
+            .home_cam
+            .works(stands_udeg - self.config.home_udeg);
+        if at_home != self.at_home {
+            self.at_home = at_home;
             self.switch_chatters_until_us = now_us + self.config.bounce_us;
         }
         if now_us < self.switch_chatters_until_us {
             self.rng.next_u32() & 1 == 0
         } else {
-            closed
+            at_home != self.config.home_opens
         }
     }
 
@@ -256,9 +304,19 @@ impl AxisPlant {
         self.slipped_udeg += udeg;
     }
 
-    /// The switch sticks, or is let go.
-    pub fn stick_switch(&mut self, reading: Option<bool>) {
-        self.switch_stuck = reading;
+    /// The switch sticks as at home or as above it, or is let go.
+    pub fn stick_switch(&mut self, at_home: Option<bool>) {
+        self.switch_stuck = at_home;
+    }
+
+    /// The cable of the home switch is cut.
+    pub fn cut_switch(&mut self) {
+        self.switch_is_cut = true;
+    }
+
+    /// The motor has its current and no brake holds it, or one of both is not so: steps are lost then.
+    pub fn let_turn(&mut self, can_turn: bool) {
+        self.can_turn = can_turn;
     }
 
     /// A worm cannot be driven back: the shaft moves only when a flank of the gear pushes it.
@@ -364,9 +422,9 @@ mod tests {
             },
             1,
         );
-        assert!(!plant.switch_closed(10_000));
+        assert!(plant.switch_closed(10_000), "normally closed");
         let t = walk(&mut plant, -100, 10_000);
         let readings: Vec<bool> = (0..40).map(|i| plant.switch_closed(t + i * 100)).collect();
-        assert!(readings.contains(&false) && readings[30..].iter().all(|&closed| closed));
+        assert!(readings.contains(&true) && readings[30..].iter().all(|&closed| !closed));
     }
 }

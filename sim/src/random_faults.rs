@@ -101,7 +101,7 @@ impl Dice {
             },
             _ => Fault::SwitchStuck {
                 axis,
-                reading: Some(self.below(2) == 0),
+                at_home: Some(self.below(2) == 0),
             },
         }
     }

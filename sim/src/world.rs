@@ -250,7 +250,11 @@ impl World {
                 arm.hardware.axis(axis).lose_encoder_until(now_us + for_us);
             }
             Fault::EncoderJump { axis, udeg } => arm.hardware.axis(axis).shift_encoder(udeg),
-            Fault::SwitchStuck { axis, reading } => arm.hardware.axis(axis).stick_switch(reading),
+            Fault::SwitchStuck { axis, at_home } => arm.hardware.axis(axis).stick_switch(at_home),
+            Fault::SwitchCut { axis } => arm.hardware.axis(axis).cut_switch(),
+            Fault::DriverAlarm { axis, for_us } => {
+                arm.hardware.raise_alarm_until(axis, now_us + for_us);
+            }
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
             Fault::Bumper { deg } => self.bumper_deg = deg,
             Fault::Unplugged { for_us } => {

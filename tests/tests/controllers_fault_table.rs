@@ -19,7 +19,7 @@ use gonia_protocol::message::{ControllerState, RequestRefusal};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_sim::arm::SimulatedArm;
 use gonia_sim::fault::{Arm, Fault, FaultEvent, FaultPlan, WireFaults};
-use gonia_sim::plant::PlantConfig;
+use gonia_sim::plant::{HomeCam, PlantConfig};
 use gonia_sim::rig::SimRig;
 
 /// The book's page of faults.
@@ -41,8 +41,12 @@ enum Cause {
     Wire(WireFaults),
     /// θ of the light arm is built like this.
     Axis(fn(&mut PlantConfig)),
+    /// φ of the light arm is built like this.
+    PhiAxis(fn(&mut PlantConfig)),
     /// The same, after a person has adjusted it on the test bench.
     Adjusted(fn(&mut PlantConfig), fn(&SimRig, &mut RemoteController)),
+    /// The driver of θ on the light arm reports an alarm, as its setting says.
+    Alarm,
     /// The power goes while the host saves settings.
     TornSave,
     /// The host falls silent during a move.
@@ -235,25 +239,41 @@ fn rows() -> Vec<Row> {
             host: "nothing to do",
         },
         Row {
-            fault: "home switch stuck closed",
+            fault: "home switch stuck as at home",
             cause: Cause::FromTheStart(Fault::SwitchStuck {
                 axis: THETA,
-                reading: Some(true),
+                at_home: Some(true),
             }),
             does: "gives up homing after the way that clears any switch",
             codes: &[FaultCode::HOME_SWITCH_STUCK],
-            end: End::Stopped("home switch stays closed"),
+            end: End::Stopped("home switch says home above it too"),
             host: "stops the session",
         },
         Row {
-            fault: "home switch stuck open",
+            fault: "home switch stuck as above home",
             cause: Cause::FromTheStart(Fault::SwitchStuck {
                 axis: THETA,
-                reading: Some(false),
+                at_home: Some(false),
             }),
             does: "stops at the end of the travel",
             codes: &[FaultCode::HOME_NOT_FOUND],
             end: End::Stopped("home switch not found"),
+            host: "stops the session",
+        },
+        Row {
+            fault: "cable of the home switch cut (normally closed)",
+            cause: Cause::FromTheStart(Fault::SwitchCut { axis: THETA }),
+            does: "takes it for home, and gives up homing after the way that clears any switch; no step down",
+            codes: &[FaultCode::HOME_SWITCH_STUCK],
+            end: End::Stopped("home switch says home above it too"),
+            host: "stops the session",
+        },
+        Row {
+            fault: "φ travels two turns, and a cam works its home switch once a turn",
+            cause: Cause::PhiAxis(|phi| phi.home_cam = HomeCam::EveryTurn { width_udeg: 2e6 }),
+            does: "drives on below home by home_probe, and finds that the switch lets go there",
+            codes: &[FaultCode::HOME_AMBIGUOUS],
+            end: End::Stopped("home switch lets go below home"),
             host: "stops the session",
         },
         Row {
@@ -266,6 +286,14 @@ fn rows() -> Vec<Row> {
             codes: &[],
             end: nothing(),
             host: "nothing to do",
+        },
+        Row {
+            fault: "driver's alarm for 20 s, driver_alarm 1",
+            cause: Cause::Alarm,
+            does: "stops both axes, engages the brakes, switches the drivers off; `clear` is refused while the alarm is there",
+            codes: &[FaultCode::DRIVER_ALARM],
+            end: End::Stopped("driver reports an alarm"),
+            host: "cannot clear the fault, stops the session",
         },
         event(
             "brown-out in mid-move",
@@ -424,13 +452,13 @@ fn poses_that_change_places() -> Vec<Pose> {
     (0..N_POSES).map(pose).collect()
 }
 
-fn light_arm(change: fn(&mut PlantConfig)) -> SimulatedArm {
+fn light_arm(change: fn(&mut PlantConfig), of: Axis) -> SimulatedArm {
     let axis = |axis: Axis, start_udeg| {
         PlantConfig::worm_axis(f64::from(Key::HomeAngle.default_of(axis)), start_udeg)
     };
-    let mut theta = axis(THETA, 21.3e6);
-    change(&mut theta);
-    SimulatedArm::new([theta, axis(Axis::Phi, -12.8e6)], 21)
+    let mut axes = [axis(THETA, 21.3e6), axis(Axis::Phi, -12.8e6)];
+    change(&mut axes[of.index()]);
+    SimulatedArm::new(axes, 21)
 }
 
 fn rig_for(cause: &Cause) -> (SimRig, u64) {
@@ -454,8 +482,19 @@ fn rig_for(cause: &Cause) -> (SimRig, u64) {
             (SimRig::new(11, plan), 0)
         }
         Cause::Axis(change) | Cause::Adjusted(change, _) => {
-            let arms = [light_arm(*change), SimulatedArm::default_arm(22)];
+            let arms = [light_arm(*change, THETA), SimulatedArm::default_arm(22)];
             (SimRig::with_arms(5, FaultPlan::default(), arms), 0)
+        }
+        Cause::PhiAxis(change) => {
+            let arms = [light_arm(*change, Axis::Phi), SimulatedArm::default_arm(22)];
+            (SimRig::with_arms(5, FaultPlan::default(), arms), 0)
+        }
+        Cause::Alarm => {
+            let alarm = Fault::DriverAlarm {
+                axis: THETA,
+                for_us: 20_000_000,
+            };
+            (SimRig::new(5, at(STRIKE_US, alarm)), STRIKE_US)
         }
         Cause::Bumper => {
             let bumper = Fault::Bumper { deg: KEEP_OUT_DEG };
@@ -494,7 +533,7 @@ fn run(row: &Row) -> Seen {
     }
     let first = stops.iter().find(|stop| stop.time_us >= strike_us);
     let safe_s = match row.cause {
-        Cause::Event(_) | Cause::HostGone => {
+        Cause::Event(_) | Cause::HostGone | Cause::Alarm => {
             first.map(|stop| (stop.time_us - strike_us) as f64 * 1e-6)
         }
         _ => None,
@@ -504,6 +543,10 @@ fn run(row: &Row) -> Seen {
 
 fn session(rig: &SimRig, cause: &Cause) -> End {
     let port = |arm| Box::new(rig.port(arm));
+    if matches!(cause, Cause::Alarm) {
+        let mut light = RemoteController::connect(port(Arm::Light), NODE_LIGHT).unwrap();
+        light.set_setting(THETA, Key::DriverAlarm, 1).unwrap();
+    }
     if let Cause::Adjusted(_, adjust) = cause {
         let mut light = RemoteController::connect(port(Arm::Light), NODE_LIGHT).unwrap();
         adjust(rig, &mut light);
@@ -558,8 +601,10 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
             let line = error.to_string();
             let reason = [
                 "home switch and encoder disagree",
-                "home switch stays closed",
+                "home switch says home above it too",
                 "home switch not found",
+                "home switch lets go below home",
+                "driver reports an alarm",
                 "camera not ready",
                 "interlock",
                 "arms would be",

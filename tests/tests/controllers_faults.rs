@@ -188,13 +188,13 @@ fn each_fault_of_an_axis_ends_in_its_code() {
 
 #[test]
 fn a_switch_that_lies_is_found_out_while_homing() {
-    for (reading, code) in [
+    for (at_home, code) in [
         (true, FaultCode::HOME_SWITCH_STUCK),
         (false, FaultCode::HOME_NOT_FOUND),
     ] {
         let stuck = Fault::SwitchStuck {
             axis: Axis::Theta,
-            reading: Some(reading),
+            at_home: Some(at_home),
         };
         let mut arm = light(&rig_with(&[(0, stuck)]));
         let ticket = arm.home().unwrap();

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use gonia_acquire::link::{RemoteController, Transport};
 use gonia_firmware::controller::ArmController;
-use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::settings::ControllerSettings;
 use gonia_firmware::steps::{Period, StepProgress};
@@ -42,12 +42,17 @@ impl Hardware for Board {
         StepProgress::default()
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
         Ok(1000)
     }
     fn home_switch_closed(&mut self, _: Axis) -> bool {
         false
     }
+    fn alarm_closed(&mut self, _: Axis) -> bool {
+        false
+    }
+    fn switch_drivers(&mut self, _: bool) {}
+    fn release_brakes(&mut self, _: bool) {}
     fn interlock_closed(&mut self) -> bool {
         true
     }

@@ -3,8 +3,10 @@
 use crate::size::{budget_of, size_of};
 use crate::tools::{add_targets, cargo, root, run};
 use anyhow::{Context, Result, bail};
+use gonia_pins::Board;
+use gonia_pins::boards::BOARDS;
+use gonia_pins::check::check;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// The board that runs in QEMU.
 const QEMU_BOARD: &str = "qemu-mps2";
@@ -26,36 +28,6 @@ pub fn size() -> Result<()> {
     check_sizes(&root)
 }
 
-/// Builds every board and leaves its image in `target/images`: ELF for a debugger, and plain bytes.
-pub fn images() -> Result<()> {
-    build()?;
-    run(Command::new("rustup").args(["component", "add", "llvm-tools"]))?;
-    let objcopy = objcopy()?;
-    let root = root()?;
-    let out = root.join("target/images");
-    std::fs::create_dir_all(&out).with_context(|| format!("{}", out.display()))?;
-    for board in folders(&root)? {
-        let program = program_of(&board)?;
-        let image = out.join(format!("gonia-{}", name_of(&board)));
-        let (elf, bin) = (image.with_extension("elf"), image.with_extension("bin"));
-        std::fs::copy(&program, &elf).with_context(|| format!("{}", program.display()))?;
-        let mut objcopy = Command::new(&objcopy);
-        // Between the vector table and the program lie the sectors of the settings: erased.
-        let arguments = ["-O", "binary", "--gap-fill", "0xFF"];
-        run(objcopy.args(arguments).arg(&elf).arg(&bin))?;
-        println!("{}\n{}", elf.display(), bin.display());
-    }
-    Ok(())
-}
-
-/// The objcopy of the component llvm-tools: it knows every chip that the compiler knows.
-fn objcopy() -> Result<PathBuf> {
-    let arguments = ["--print", "target-libdir"];
-    let output = Command::new("rustc").args(arguments).output()?;
-    let libraries = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
-    Ok(libraries.with_file_name("bin").join("llvm-objcopy"))
-}
-
 /// Adds every board's target to the toolchain.
 pub fn add_boards_targets(root: &Path) -> Result<()> {
     let boards = folders(root)?;
@@ -68,8 +40,9 @@ pub fn add_boards_targets(root: &Path) -> Result<()> {
     add_targets(&targets)
 }
 
-/// Lints and builds every board.
+/// Checks the pins of every board, then lints and builds it.
 pub fn build_all(root: &Path) -> Result<()> {
+    check_pins(BOARDS)?;
     for board in folders(root)? {
         println!("board {}", board.display());
         run(cargo(&board).args(["clippy", "--release", "--", "-D", "warnings"]))?;
@@ -78,13 +51,26 @@ pub fn build_all(root: &Path) -> Result<()> {
     Ok(())
 }
 
+/// What cannot be of a board: two uses of a pin, a pin that its timer does not reach, settings in the image.
+fn check_pins(boards: &[&Board]) -> Result<()> {
+    let mut faults = Vec::new();
+    for board in boards {
+        check(board, |fault| {
+            faults.push(format!("{}: {fault}", board.name))
+        });
+    }
+    if !faults.is_empty() {
+        bail!("{}", faults.join("\n"));
+    }
+    Ok(())
+}
+
 /// Compares what has been built with the budgets.
 pub fn check_sizes(root: &Path) -> Result<()> {
-    println!("{:<12} {:>9} {:>9}   budget", "board", "flash", "RAM");
+    println!("{:<16} {:>9} {:>9}   budget", "board", "flash", "RAM");
     let mut over = Vec::new();
-    for folder in folders(root)? {
-        let name = name_of(&folder);
-        let size = size_of(&program_of(&folder)?)?;
+    for Program { name, elf } in programs(root)? {
+        let size = size_of(&elf)?;
         let verdict = match budget_of(&name) {
             None => "none: it carries the simulated machine and ships nowhere".to_owned(),
             Some(budget) => {
@@ -96,7 +82,7 @@ pub fn check_sizes(root: &Path) -> Result<()> {
                 format!("{word} {} and {} bytes", budget.flash, budget.ram)
             }
         };
-        println!("{name:<12} {:>9} {:>9}   {verdict}", size.flash, size.ram);
+        println!("{name:<16} {:>9} {:>9}   {verdict}", size.flash, size.ram);
     }
     if !over.is_empty() {
         bail!(
@@ -128,13 +114,53 @@ pub fn qemu_elf(root: &Path) -> Result<PathBuf> {
 
 /// The program of a board, by its name.
 pub fn elf(root: &Path, board: &str) -> Result<PathBuf> {
-    program_of(&root.join("firmware/boards").join(board))
+    let mut programs = programs(root)?.into_iter();
+    let program = programs.find(|program| program.name == board);
+    let program =
+        program.with_context(|| format!("no folder of firmware/boards builds {board}"))?;
+    Ok(program.elf)
 }
 
-/// The program of a board: each is named after its folder.
-fn program_of(board: &Path) -> Result<PathBuf> {
-    let built = board.join("target").join(target_of(board)?).join("release");
-    Ok(built.join(format!("gonia-{}", name_of(board))))
+/// What is built for a board.
+struct Program {
+    /// The board's name.
+    name: String,
+    /// Where the build leaves it.
+    elf: PathBuf,
+}
+
+/// Every folder's programs: several boards may share a folder.
+fn programs(root: &Path) -> Result<Vec<Program>> {
+    let mut programs = Vec::new();
+    for folder in folders(root)? {
+        let file = folder.join("Cargo.toml");
+        let text = std::fs::read_to_string(&file).with_context(|| format!("{}", file.display()))?;
+        let built = folder.join("target").join(target_of(&folder)?);
+        let names = programs_in(&text).with_context(|| format!("{}", file.display()))?;
+        programs.extend(names.into_iter().map(|name| Program {
+            elf: built.join("release").join(format!("gonia-{name}")),
+            name,
+        }));
+    }
+    Ok(programs)
+}
+
+/// The boards of a manifest: its programs without `gonia-`, or its package where it names none.
+fn programs_in(manifest: &str) -> Result<Vec<String>> {
+    let manifest: toml::Table = manifest.parse()?;
+    let name_in = |value: &toml::Value| {
+        let name = value.get("name")?.as_str()?;
+        Some(name.strip_prefix("gonia-")?.to_owned())
+    };
+    let named = match manifest.get("bin").and_then(|bins| bins.as_array()) {
+        Some(bins) => bins.iter().map(name_in).collect(),
+        None => manifest
+            .get("package")
+            .map(|package| name_in(package).into_iter().collect()),
+    };
+    let named: Option<Vec<String>> = named;
+    let named = named.filter(|names| !names.is_empty());
+    named.context("a program is not called gonia-NAME; name it so in [[bin]] or [package]")
 }
 
 /// The target of a board, from its own settings of cargo.
@@ -154,11 +180,6 @@ fn target_in(settings: &str) -> Result<String> {
     Ok(target.context("[build] names no target")?.to_owned())
 }
 
-fn name_of(board: &Path) -> String {
-    let name = board.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,6 +190,37 @@ mod tests {
         assert_eq!(target_in(settings).unwrap(), "thumbv6m-none-eabi");
         assert!(target_in("[env]\ntarget = \"no\"\n").is_err());
         assert!(target_in("[build]\ntarget = [\"a\"]\n").is_err());
+    }
+
+    #[test]
+    fn a_folder_builds_the_programs_that_its_manifest_names() {
+        let package = "[package]\nname = \"gonia-one\"\n";
+        assert_eq!(programs_in(package).unwrap(), ["one"]);
+        let bins = "[[bin]]\nname = \"gonia-a\"\n[[bin]]\nname = \"gonia-b\"\n";
+        let both = format!("{package}{bins}");
+        assert_eq!(programs_in(&both).unwrap(), ["a", "b"]);
+        assert!(programs_in("[package]\nname = \"other\"\n").is_err());
+        assert!(programs_in(&both.replace("gonia-b", "b")).is_err());
+    }
+
+    #[test]
+    fn every_board_of_the_pins_has_a_program() {
+        let root = root().unwrap();
+        for board in BOARDS {
+            elf(&root, board.name).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_board_with_two_uses_of_a_pin_is_not_built() {
+        check_pins(BOARDS).unwrap();
+        let mut wrong = gonia_pins::boards::BTT_OCTOPUS;
+        wrong.camera_jumper.pin = wrong.interlock.pin;
+        let error = check_pins(&[&wrong]).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "btt-octopus: PG10 is both interlock chain and camera arm; choose another pin for one"
+        );
     }
 
     #[test]

@@ -2,13 +2,17 @@
 
 mod boards;
 mod book;
+mod dfu;
 mod doors;
 mod figures;
 mod fuzz;
+mod hex;
 mod image;
+mod images;
 mod imports;
 mod length;
 mod links;
+mod load;
 mod modules;
 mod readers;
 mod size;
@@ -17,6 +21,8 @@ mod systems;
 mod table;
 mod tools;
 mod windows;
+mod wiring;
+mod wiring_figure;
 
 use std::process::ExitCode;
 
@@ -24,13 +30,14 @@ const USAGE: &str = "\
 cargo xtask test     set up what the tests need, then all that a change must pass
 cargo xtask doors    which crate may use which, which file imports which, how long functions are
 cargo xtask boards   build the firmware of every board
-cargo xtask images   the boards' firmware as ELF and as plain bytes, in target/images
-cargo xtask image [--all | NAME]  the image that is flashed, on an emulated chip with the arm on its pins
+cargo xtask images   the boards' firmware as files to flash (ELF, HEX, DFU, plain bytes), in target/images
+cargo xtask image [BOARD] [--all | NAME]  the images that are flashed, on an emulated chip with the arm on its pins
 cargo xtask size     flash and RAM of every board against its budget
 cargo xtask systems  lint everything for Windows and macOS (the tests do so for Windows)
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
 cargo xtask windows  run the demo under Wine: the same bytes as on Linux
 cargo xtask readers  what gonia exports, read by other programs (from PyPI)
+cargo xtask wiring   the tables and figures of the wiring pages, from the boards' pins
 cargo xtask book     check the links of all pages and build the book in docs/book
 cargo xtask figures [NAME]  measure a table of the book and write it; without NAME, list them";
 
@@ -42,13 +49,14 @@ fn main() -> ExitCode {
         "test" => steps::test(),
         "doors" => steps::doors(),
         "boards" => boards::build(),
-        "images" => boards::images(),
+        "images" => images::images(),
         "image" => image::image(&rest),
         "size" => boards::size(),
         "systems" => steps::systems(),
         "fuzz" => steps::fuzz(),
         "windows" => windows::compare_with_linux(),
         "readers" => readers::check(),
+        "wiring" => tools::root().and_then(|root| wiring::write(&root)),
         "book" => book::book(),
         "figures" => tools::root().and_then(|root| figures::figures(&root, &rest)),
         _ => {

@@ -72,12 +72,14 @@ fn size_in(elf: &[u8]) -> Result<Size> {
     Ok(size)
 }
 
-fn word(bytes: &[u8], at: usize) -> Result<u32> {
+/// Four bytes, little endian.
+pub fn word(bytes: &[u8], at: usize) -> Result<u32> {
     let part = bytes.get(at..).and_then(|rest| rest.first_chunk::<4>());
     Ok(u32::from_le_bytes(*part.context("cut short")?))
 }
 
-fn half(bytes: &[u8], at: usize) -> Result<u16> {
+/// Two bytes, little endian.
+pub fn half(bytes: &[u8], at: usize) -> Result<u16> {
     let part = bytes.get(at..).and_then(|rest| rest.first_chunk::<2>());
     Ok(u16::from_le_bytes(*part.context("cut short")?))
 }
@@ -121,7 +123,7 @@ mod tests {
 
     #[test]
     fn a_board_over_its_budget_is_told_from_one_within() {
-        let budget = budget_of("stm32f4").expect("it ships");
+        let budget = budget_of("nucleo-f446re").expect("it ships");
         let full = Size {
             flash: budget.flash,
             ram: budget.ram,

@@ -2,7 +2,9 @@
 
 use crate::table::Table;
 use crate::tools::{cargo, install, install_library, root, run};
-use crate::{boards, book, doors, figures, fuzz, image, imports, length, links, systems};
+use crate::{
+    boards, book, doors, figures, fuzz, image, images, imports, length, links, systems, wiring,
+};
 use anyhow::{Result, bail};
 use std::path::Path;
 use std::process::Command;
@@ -67,6 +69,7 @@ fn check_doors(table: &mut Table, root: &Path) -> Result<()> {
 fn read_sources(table: &mut Table, root: &Path) -> Result<()> {
     check_doors(table, root)?;
     table.step("links", || links::check(root))?;
+    table.step("wiring of the boards", || wiring::check(root))?;
     table.step("tables of the book", || {
         figures::figures(root, &["--check".to_owned()])
     })?;
@@ -111,6 +114,9 @@ fn compile(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
 fn compile_others(table: &mut Table, root: &Path) -> Result<()> {
     table.step("boards", || boards::build_all(root))?;
     table.step("size of the boards", || boards::check_sizes(root))?;
+    table.step("files of the images", || {
+        images::write_all(root, &root.join("target/images"))
+    })?;
     table.step("build of the emulated chip", || image::build(root))?;
     match fuzz::missing() {
         None => table.step("build of the fuzzers", || fuzz::build(root)),

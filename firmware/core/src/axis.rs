@@ -265,7 +265,7 @@ impl AxisDrive {
     ) -> Result<EncoderReading, FaultCode> {
         let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
         let encoder = &mut self.encoder;
-        let reading = hardware.encoder_counts(self.axis, turn as u32);
+        let reading = hardware.encoder_counts(self.axis, settings.encoder(self.axis));
         let reading = match reading {
             // Count 0 stays where it is.
             Ok(raw) if encoder.is_reversed && raw > 0 && i64::from(raw) < turn => {
@@ -307,6 +307,12 @@ impl AxisDrive {
         } else {
             Ok(EncoderReading::Stale)
         }
+    }
+
+    /// Whether the axis can travel so far that a cam on it closes the home switch at several turns.
+    pub fn travels_a_turn(&self, settings: &ControllerSettings) -> bool {
+        let get = |key| i64::from(settings.get(self.axis, key));
+        get(Key::SoftMax) - get(Key::HomeAngle) >= TURN_UDEG - get(Key::HomeProbe)
     }
 
     /// Forgets the encoder's past, so that the next reading is taken as it is.

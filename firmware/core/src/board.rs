@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
     use crate::controller::ArmController;
-    use crate::hardware::{EncoderLost, NotSaved};
+    use crate::hardware::{EncoderLost, EncoderSetup, NotSaved};
     use crate::node::identity;
     use crate::steps::{Period, StepProgress};
 
@@ -108,12 +108,17 @@ mod tests {
             StepProgress::default()
         }
         fn halt(&mut self, _: Axis) {}
-        fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
+        fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
             Ok(1000)
         }
         fn home_switch_closed(&mut self, _: Axis) -> bool {
             false
         }
+        fn alarm_closed(&mut self, _: Axis) -> bool {
+            false
+        }
+        fn switch_drivers(&mut self, _: bool) {}
+        fn release_brakes(&mut self, _: bool) {}
         fn interlock_closed(&mut self) -> bool {
             true
         }

@@ -8,6 +8,24 @@ use crate::steps::{Period, StepProgress};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderLost;
 
+/// What an encoder speaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderKind {
+    /// SSI: see [`crate::ssi`].
+    Ssi,
+    /// BiSS-C with its CRC: see [`crate::biss`].
+    BissC,
+}
+
+/// How an encoder is to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderSetup {
+    /// What it speaks.
+    pub kind: EncoderKind,
+    /// Counts of one turn: a power of two.
+    pub turn: u32,
+}
+
 /// The settings are not in the board's memory; what was there before still is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotSaved;
@@ -24,11 +42,20 @@ pub trait Hardware {
     /// No step of this axis after this; whatever waits is dropped.
     fn halt(&mut self, axis: Axis);
 
-    /// The absolute encoder of the shaft, in counts of one turn, of which there are so many.
-    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost>;
+    /// The absolute encoder of the shaft, in counts of one turn.
+    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost>;
 
-    /// Whether the home switch is closed: it is at and below the home angle.
+    /// Whether the contact of the home switch is closed: above home, where it is normally closed.
     fn home_switch_closed(&mut self, axis: Axis) -> bool;
+
+    /// Whether the contact of the alarm output of an axis's driver is closed.
+    fn alarm_closed(&mut self, axis: Axis) -> bool;
+
+    /// Gives the motors' drivers their current, or takes it away.
+    fn switch_drivers(&mut self, on: bool);
+
+    /// Lets the brakes go, or engages them. Without power they are engaged.
+    fn release_brakes(&mut self, released: bool);
 
     /// Whether the interlock that both controllers share is closed, so that motion is allowed.
     fn interlock_closed(&mut self) -> bool;

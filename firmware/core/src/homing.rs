@@ -1,8 +1,14 @@
 //! How one axis finds home: fast seek, back off, slow approach, zero.
 //!
-//! The switch is closed at and below the home angle. It shows only *which turn* the shaft is in;
-//! the angle within the turn is the absolute encoder's, so the switch's own repeatability (some
-//! 0.01°) does not enter the zero.
+//! The switch shows only *which turn* the shaft is in; the angle within the turn is the absolute
+//! encoder's, so the switch's own repeatability (some 0.01°) does not enter the zero.
+//!
+//! A switch that says "home" at and below the home angle shows the turn wherever the axis stands. One with a cam
+//! on the shaft says so once a turn, and shows it only to an axis that cannot travel a turn. The two differ
+//! below home: the cam lets its switch go again. So an axis that can travel a turn drives on below home by
+//! `home_probe`, which is wider than the cam, and is home only where the switch still says so. Up would not do:
+//! the next cam may lie beyond the stop. Nor is it enough to search for a lower cam: the lowest one is known
+//! only by the stop below it.
 
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::settings::Key;
@@ -13,6 +19,8 @@ use crate::settings::ControllerSettings;
 
 /// Equal readings that end a bounce of the switch (at one reading every 2 ms).
 const DEBOUNCE: u8 = 3;
+/// Equal readings that no chatter of a worn switch gives (40 ms): 0.1 s.
+const CERTAIN: u8 = 50;
 /// The slow way off the switch is this part of the fast search's speed.
 const CLEARING_SLOWDOWN: u64 = 4;
 /// Settling timeouts until an arm has swung out.
@@ -24,18 +32,22 @@ const MAX_BELOW: i64 = 10;
 enum HomingPhase {
     /// At rest, until the switch's reading is steady.
     Look,
-    /// Fast, down, until the switch closes.
+    /// Fast, down, until the switch says home.
     Seek,
     /// Slowing down below the switch.
     Stop,
-    /// Up, until the switch opens.
+    /// Up, onto a cam that the fast search ran across.
+    Return,
+    /// Up, until the switch lets go.
     Clear,
     /// Slowing down above it.
     StopAbove,
     /// A little further up.
     BackOff,
-    /// Slowly down, until it closes again.
+    /// Slowly down, until it says so again.
     Approach,
+    /// Down, to see whether the switch still says home there.
+    Probe,
     /// Home is known; on to the lowest admissible angle.
     Park,
     /// Until the arm has swung out.
@@ -62,11 +74,11 @@ pub struct Homing {
 
 impl Homing {
     /// Begins, with the axis at rest.
-    pub fn begin(switch_closed: bool) -> Self {
+    pub fn begin(at_home: bool) -> Self {
         Self {
             phase: HomingPhase::Look,
             same_readings: 1,
-            last_reading: switch_closed,
+            last_reading: at_home,
             rest_sum: 0,
             rest_count: 0,
         }
@@ -86,15 +98,35 @@ impl Homing {
     pub fn tick(
         &mut self,
         now_us: u64,
-        switch_closed: bool,
+        at_home: bool,
         drive: &mut AxisDrive,
         settings: &ControllerSettings,
         hardware: &mut impl Hardware,
     ) -> Result<(), FaultCode> {
-        let steady = self.is_steady(switch_closed);
+        self.note(at_home);
+        match self.phase {
+            HomingPhase::Probe => self.probe(at_home, drive, settings),
+            HomingPhase::Park | HomingPhase::Rest { .. } | HomingPhase::Read { .. } => {
+                self.park(now_us, drive, settings);
+                Ok(())
+            }
+            HomingPhase::Done => Ok(()),
+            _ => self.search(at_home, drive, settings, hardware),
+        }
+    }
+
+    /// Until the slow approach has found where the switch changes.
+    fn search(
+        &mut self,
+        at_home: bool,
+        drive: &mut AxisDrive,
+        settings: &ControllerSettings,
+        hardware: &mut impl Hardware,
+    ) -> Result<(), FaultCode> {
+        let steady = self.same_readings >= DEBOUNCE;
         let backoff = i64::from(settings.get(drive.axis(), Key::HomeBackoff));
         match self.phase {
-            HomingPhase::Look if steady && switch_closed => self.clear(drive, settings),
+            HomingPhase::Look if steady && at_home => self.clear(drive, settings),
             HomingPhase::Look if steady => {
                 // The whole travel, and a tenth more.
                 let axis = drive.axis();
@@ -104,13 +136,24 @@ impl Homing {
                 drive.run(-drive.steps_of(travel * 11 / 10), ramp);
                 self.phase = HomingPhase::Seek;
             }
-            HomingPhase::Seek if switch_closed && steady => {
+            HomingPhase::Seek if at_home && steady => {
                 drive.decelerate();
                 self.phase = HomingPhase::Stop;
             }
             HomingPhase::Seek if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
-            HomingPhase::Stop if !drive.is_moving() => self.clear(drive, settings),
-            HomingPhase::Clear if !switch_closed && steady => {
+            HomingPhase::Stop if !drive.is_moving() && at_home && steady => {
+                self.clear(drive, settings);
+            }
+            HomingPhase::Stop if !drive.is_moving() && self.is_off_for_certain() => {
+                if drive.travels_a_turn(settings) {
+                    return Err(FaultCode::HOME_AMBIGUOUS);
+                }
+                self.clear(drive, settings);
+                self.phase = HomingPhase::Return;
+            }
+            HomingPhase::Return if at_home && steady => self.phase = HomingPhase::Clear,
+            HomingPhase::Return if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            HomingPhase::Clear if !at_home && steady => {
                 drive.decelerate();
                 self.phase = HomingPhase::StopAbove;
             }
@@ -120,7 +163,7 @@ impl Homing {
                 self.phase = HomingPhase::BackOff;
             }
             HomingPhase::BackOff if !drive.is_moving() => {
-                if switch_closed {
+                if at_home {
                     return Err(FaultCode::HOME_SWITCH_STUCK);
                 }
                 let ramp = drive.ramp(settings, Key::HomeSlowSpeed);
@@ -128,13 +171,49 @@ impl Homing {
                 self.phase = HomingPhase::Approach;
             }
             // The first contact counts, bounce or not: the encoder has the angle.
-            HomingPhase::Approach if switch_closed => {
+            HomingPhase::Approach if at_home => {
                 drive.halt(hardware);
                 drive.set_turn_at_home(settings)?;
-                drive.go_to(settings.get(drive.axis(), Key::SoftMin), settings);
-                self.phase = HomingPhase::Park;
+                if drive.travels_a_turn(settings) {
+                    let way = i64::from(settings.get(drive.axis(), Key::HomeProbe));
+                    let ramp = drive.ramp(settings, Key::HomeFastSpeed);
+                    drive.run(-drive.steps_of(way), ramp);
+                    self.same_readings = 0;
+                    self.phase = HomingPhase::Probe;
+                } else {
+                    self.go_to_park(drive, settings);
+                }
             }
             HomingPhase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Below home: whether the switch still says so.
+    fn probe(
+        &mut self,
+        at_home: bool,
+        drive: &mut AxisDrive,
+        settings: &ControllerSettings,
+    ) -> Result<(), FaultCode> {
+        if self.is_off_for_certain() {
+            return Err(FaultCode::HOME_AMBIGUOUS);
+        }
+        if !drive.is_moving() && at_home && self.same_readings >= CERTAIN {
+            self.go_to_park(drive, settings);
+        }
+        Ok(())
+    }
+
+    fn go_to_park(&mut self, drive: &mut AxisDrive, settings: &ControllerSettings) {
+        drive.go_to(settings.get(drive.axis(), Key::SoftMin), settings);
+        self.phase = HomingPhase::Park;
+    }
+
+    /// To the lowest admissible angle, and the encoder's mean there.
+    fn park(&mut self, now_us: u64, drive: &mut AxisDrive, settings: &ControllerSettings) {
+        match self.phase {
             HomingPhase::Park if !drive.is_moving() => {
                 let timeout_us = settings.get_u64(drive.axis(), Key::SettlingTimeout);
                 let until_us = now_us + SWING_OUT * timeout_us;
@@ -154,7 +233,6 @@ impl Homing {
             }
             _ => {}
         }
-        Ok(())
     }
 
     fn clear(&mut self, drive: &mut AxisDrive, settings: &ControllerSettings) {
@@ -169,14 +247,18 @@ impl Homing {
         self.phase = HomingPhase::Clear;
     }
 
-    fn is_steady(&mut self, reading: bool) -> bool {
+    fn note(&mut self, reading: bool) {
         if reading == self.last_reading {
             self.same_readings = self.same_readings.saturating_add(1);
         } else {
             self.last_reading = reading;
             self.same_readings = 1;
         }
-        self.same_readings >= DEBOUNCE
+    }
+
+    /// The switch has let go, and not for a bounce.
+    fn is_off_for_certain(&self) -> bool {
+        !self.last_reading && self.same_readings >= CERTAIN
     }
 }
 

@@ -10,22 +10,29 @@
 //! | [`axis`] | one axis: steps, encoder, segments of a move |
 //! | [`profile`], [`steps`] | when the next step is due; from the main loop to the timer that gives it |
 //! | [`homing`], [`settling`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
+//! | [`power`] | motors' current and brakes: which goes first |
 //! | [`error_map`] | what the encoder reads wrong over a turn, and its removal |
 //! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
 //! | [`board`] | the main loop of every board, and what a board gives it |
-//! | [`hardware`], [`ssi`] | what a board must offer; an absolute encoder over `embedded-hal` |
+//! | [`hardware`] | what a board must offer |
+//! | [`spi_encoder`] ([`ssi`], [`biss`]) | an absolute encoder over `embedded-hal`; what its words say |
+//! | [`clock`] | a board's counter made one of 64 bits, and its alarm |
 #![no_std]
 
 pub mod axis;
+pub mod biss;
 pub mod board;
+pub mod clock;
 pub mod controller;
 pub mod error_map;
 pub mod hardware;
 pub mod homing;
 pub mod node;
+pub mod power;
 pub mod profile;
 pub mod settings;
 pub mod settling;
+pub mod spi_encoder;
 pub mod ssi;
 pub mod steps;
 pub mod store;

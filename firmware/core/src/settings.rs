@@ -7,6 +7,8 @@
 use gonia_protocol::crc32c;
 use gonia_protocol::settings::{Axis, Key, MEANINGS, N_SETTINGS};
 
+use crate::hardware::{EncoderKind, EncoderSetup};
+
 const FORMAT: u8 = 1;
 const HEAD: usize = 2;
 
@@ -47,6 +49,17 @@ impl ControllerSettings {
     /// A value that is never negative, in the key's unit.
     pub fn get_u64(&self, axis: Axis, key: Key) -> u64 {
         self.get(axis, key).max(0) as u64
+    }
+
+    /// How the encoder of an axis is read.
+    pub fn encoder(&self, axis: Axis) -> EncoderSetup {
+        EncoderSetup {
+            kind: match self.get(axis, Key::EncoderKind) {
+                0 => EncoderKind::Ssi,
+                _ => EncoderKind::BissC,
+            },
+            turn: self.get_u64(axis, Key::EncoderCountsPerTurn) as u32,
+        }
     }
 
     /// Changes a value, or nothing. A setting of the node changes for both axes.

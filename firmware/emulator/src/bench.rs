@@ -2,6 +2,11 @@
 
 use std::sync::mpsc::{Receiver, Sender};
 
+use gonia_pins::signals::{Signal, function};
+use gonia_pins::{
+    Board, CLOCK_TIMER, FLASH, FLASH_LEN, LIFE_TIMER, Level as Wanted, Pin as PinOf, SECTORS,
+    STEP_TIMERS, StepEdge, TimerOutput,
+};
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::mcu::Operate;
@@ -13,7 +18,8 @@ use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::time::VirtualNanos;
 
 use crate::chips::{Shared, lock};
-use crate::part::{Bench, FLASH, FLASH_LEN, SECTORS};
+use crate::nvic;
+use crate::part::Bench;
 
 /// What the script asks of the chip's side while the clock stands.
 #[derive(Debug)]
@@ -24,8 +30,10 @@ pub enum Command {
     HoldCore(bool),
     /// The processor's next access here ends in a bus fault.
     Fail(u64),
-    /// A register.
+    /// A register of a peripheral.
     Peek(u64),
+    /// An interrupt in the core's NVIC, as [`nvic::Interrupt::to_word`] has it.
+    Interrupt(usize),
     /// The other arm raises the trigger wire, or lets it go.
     TriggerIn(bool),
     /// The reset pin goes low and comes back.
@@ -34,33 +42,85 @@ pub enum Command {
     End,
 }
 
-/// An output of the chip, and whether its pin is given to it.
+/// What drives an output of the chip, where its pin is given to it.
 #[derive(Clone, Copy, Debug)]
-enum Output {
-    /// Port, pin.
-    Plain(usize, u8),
-    /// Port, pin, alternate function, general-purpose timer (TIM2 … TIM5 as 0 … 3), channel.
-    Timer(usize, u8, u8, usize, u8),
-    /// The same for TIM8.
-    Tim8(usize, u8, u8, u8),
+enum Source {
+    /// The port's own register.
+    Plain,
+    /// Alternate function, general-purpose timer (TIM2 to TIM5 as 0 to 3), channel.
+    Timer(u8, usize, u8),
+    /// Alternate function, channel of TIM8, and whether it is the complementary output.
+    Tim8(u8, u8, bool),
 }
 
-const STEPS: [Output; 2] = [
-    Output::Timer(A, 0, 2, TIM5, 1),
-    Output::Timer(B, 10, 1, TIM2, 3),
-];
-const DIRECTIONS: [Output; 2] = [Output::Plain(A, 9), Output::Plain(B, 4)];
-const ENABLE: Output = Output::Plain(C, 3);
-const RELAY: Output = Output::Tim8(C, 6, 3, 1);
-const TRIGGER: Output = Output::Timer(B, 5, 2, TIM3, 2);
-/// Inputs: port, pin.
-const HOME: [(usize, u8); 2] = [(C, 0), (C, 1)];
-const CHAIN: (usize, u8) = (C, 2);
-const TRIGGER_IN: (usize, u8) = (C, 8);
+/// An output: its pin, what drives it, and the level at which what hangs on it is on.
+#[derive(Clone, Copy, Debug)]
+struct Output {
+    pin: PinOf,
+    source: Source,
+    on: Level,
+}
 
-const A: usize = 0;
-const B: usize = 1;
-const C: usize = 2;
+/// The outputs of a board.
+#[derive(Debug)]
+struct Outputs {
+    steps: [Output; 2],
+    directions: [Output; 2],
+    enables: Vec<Output>,
+    relay: Output,
+    brakes: Option<Output>,
+    trigger: Output,
+}
+
+impl Outputs {
+    fn of(board: &Board) -> Self {
+        let high = |pin, source| Output {
+            pin,
+            source,
+            on: Level::High,
+        };
+        let [theta, phi] = board.axes;
+        let step = |i: usize, axis: gonia_pins::Axis| match axis.edge {
+            StepEdge::Timer(channel) => {
+                high(axis.step.pin, timer(axis.step.pin, STEP_TIMERS[i], channel))
+            }
+            StepEdge::Interrupt => high(axis.step.pin, Source::Plain),
+        };
+        let out = board.trigger_out;
+        let of_tim8 = |output: TimerOutput| {
+            let signal = if output.is_complementary {
+                Signal::TimerComplement(LIFE_TIMER, output.channel)
+            } else {
+                Signal::Timer(LIFE_TIMER, output.channel)
+            };
+            let given = function(output.wire.pin, signal).unwrap_or(0);
+            let source = Source::Tim8(given, output.channel, output.is_complementary);
+            high(output.wire.pin, source)
+        };
+        let enables = board.enables.iter().map(|enable| Output {
+            pin: enable.wire.pin,
+            source: Source::Plain,
+            on: match enable.on {
+                Wanted::High => Level::High,
+                Wanted::Low => Level::Low,
+            },
+        });
+        Self {
+            steps: [step(0, theta), step(1, phi)],
+            directions: [theta, phi].map(|axis| high(axis.direction.pin, Source::Plain)),
+            enables: enables.collect(),
+            relay: of_tim8(board.relay),
+            brakes: board.brakes.map(of_tim8),
+            trigger: high(out.wire.pin, timer(out.wire.pin, CLOCK_TIMER, out.channel)),
+        }
+    }
+}
+
+fn timer(pin: PinOf, timer: u8, channel: u8) -> Source {
+    let given = function(pin, Signal::Timer(timer, channel)).unwrap_or(0);
+    Source::Timer(given, usize::from(timer) - 2, channel)
+}
+
 const TIM2: usize = 0;
 const TIM3: usize = 1;
 const TIM4: usize = 2;
@@ -77,7 +137,13 @@ const ITR_TIM3_OF_TIM4: u8 = 2;
 const GPIO: core::ops::Range<u64> = 0x4002_0000..0x4002_2C00;
 const TIMERS: core::ops::Range<u64> = 0x4000_0000..0x4000_1000;
 const ADVANCED_TIMERS: core::ops::Range<u64> = 0x4001_0000..0x4001_0800;
-const SPI_CR1: [u64; 2] = [0x4001_3000, 0x4000_3800];
+/// CR1 of SPI1 to SPI4, and whether it is on APB2.
+const SPI_CR1: [(u64, bool); 4] = [
+    (0x4001_3000, true),
+    (0x4000_3800, false),
+    (0x4000_3C00, false),
+    (0x4001_3400, true),
+];
 const FLASH_CR: u64 = 0x4002_3C10;
 const FLASH_SR: u64 = 0x4002_3C0C;
 const STRT: u64 = 1 << 16;
@@ -92,17 +158,20 @@ pub struct Wiring {
     pub commands: Receiver<Command>,
     /// To the script: the clock stands, with the value that was asked for.
     pub done: Sender<u32>,
+    board: &'static Board,
+    outputs: Outputs,
     state: State,
 }
 
 /// Levels as they were last seen or driven.
 #[derive(Debug, Default)]
 struct State {
+    has_resistors: bool,
     steps: [bool; 2],
     trigger: bool,
     gate: Option<Level>,
     time_pulses: u64,
-    inputs: [Option<Level>; 3],
+    inputs: [Option<Level>; 5],
     resets: usize,
     is_erasing: bool,
     core_is_held: bool,
@@ -110,11 +179,18 @@ struct State {
 
 impl Wiring {
     /// Wires a chip up.
-    pub fn new(world: Shared, commands: Receiver<Command>, done: Sender<u32>) -> Self {
+    pub fn new(
+        board: &'static Board,
+        world: Shared,
+        commands: Receiver<Command>,
+        done: Sender<u32>,
+    ) -> Self {
         Self {
             world,
             commands,
             done,
+            board,
+            outputs: Outputs::of(board),
             state: State::default(),
         }
     }
@@ -122,44 +198,63 @@ impl Wiring {
     /// After anything that may have changed an output.
     fn look(&mut self, chip: &mut Stm32f427, at: VirtualNanos) {
         self.link_timers(chip, at);
+        if !self.state.has_resistors {
+            self.state.has_resistors = true;
+            self.board.for_each_use(|this| {
+                let level = this
+                    .resistor
+                    .map(|level| Level::from(level == Wanted::High));
+                if level.is_some() {
+                    drive(chip, at, this.wire.pin, level);
+                }
+            });
+        }
         let mut world = lock(&self.world);
         world.now_ns = at.0;
-        let enabled = level(chip, ENABLE);
+        let outputs = &self.outputs;
+        let enabled = outputs.enables.iter().all(|&enable| is_on(chip, enable));
+        let released = outputs.brakes.is_none_or(|brakes| is_on(chip, brakes));
+        world.see_power(enabled, released);
         for i in 0..2 {
-            let up = level(chip, DIRECTIONS[i]);
+            let up = is_on(chip, outputs.directions[i]);
             let axis = &mut world.axes[i];
-            axis.is_enabled = enabled;
             if up != axis.up {
                 axis.up = up;
                 axis.turned_ns = at.0;
             }
-            let step = level(chip, STEPS[i]);
-            if step && !self.state.steps[i] {
-                axis.step(at.0);
+            let step = is_on(chip, outputs.steps[i]);
+            match (self.state.steps[i], step) {
+                (false, true) => axis.step(at.0),
+                (true, false) => axis.fall(at.0),
+                _ => {}
             }
             self.state.steps[i] = step;
         }
-        let trigger = level(chip, TRIGGER);
+        let trigger = is_on(chip, outputs.trigger);
         if trigger != self.state.trigger {
             world.trigger.push((at.0, trigger));
             self.state.trigger = trigger;
         }
-        world.relay.energise(level(chip, RELAY), at.0);
+        world.relay.energise(is_on(chip, outputs.relay), at.0);
         let now_us = at.0 / 1000;
         let switches = [0, 1].map(|i| world.axes[i].plant.switch_closed(now_us));
+        let alarms = [0, 1].map(|i| world.axes[i].alarm_closed);
         let closed = world.chain_is_closed();
         drop(world);
-        let inputs = [
-            (HOME[0], switches[0]),
-            (HOME[1], switches[1]),
-            (CHAIN, closed),
+        let [theta, phi] = self.board.axes;
+        let mut inputs = vec![
+            (theta.home_switch.pin, switches[0]),
+            (phi.home_switch.pin, switches[1]),
+            (self.board.interlock.pin, closed),
         ];
-        for (known, ((port, pin), closed)) in self.state.inputs.iter_mut().zip(inputs) {
+        let wires = self.board.alarms.iter().flatten();
+        inputs.extend(wires.zip(alarms).map(|(wire, closed)| (wire.pin, closed)));
+        for (known, (pin, closed)) in self.state.inputs.iter_mut().zip(inputs) {
             // A closed contact leads to ground; an open one leaves the pin to its pull-up.
             let drives = closed.then_some(Level::Low);
             if *known != Some(Level::from(!closed)) {
                 *known = Some(Level::from(!closed));
-                drive(chip, at, port, pin, drives);
+                drive(chip, at, pin, drives);
             }
         }
     }
@@ -190,10 +285,18 @@ impl Wiring {
     /// A write that means something outside the chip.
     fn take_write(&mut self, session: &mut Session<Bench>, host: &mut dyn Host, access: &Access) {
         let chip = &mut session.board_mut().chip;
-        if let Some(axis) = SPI_CR1.iter().position(|&cr1| cr1 == access.address) {
-            let divider = 2u64 << (access.value >> 3 & 7);
-            let bus = if axis == 0 { pclk2(chip) } else { pclk1(chip) };
-            lock(&self.world).axes[axis].ssi_hz = bus as f64 / divider as f64;
+        for (i, axis) in self.board.axes.iter().enumerate() {
+            let (cr1, is_fast) = SPI_CR1[usize::from(axis.encoder.spi) - 1];
+            if cr1 == access.address {
+                let divider = 2u64 << (access.value >> 3 & 7);
+                let hz = self.board.crystal.hz;
+                let bus = if is_fast {
+                    pclk2(chip, hz)
+                } else {
+                    pclk1(chip, hz)
+                };
+                lock(&self.world).axes[i].ssi_hz = bus as f64 / divider as f64;
+            }
         }
         if access.address == FLASH_CR && access.value & STRT != 0 && access.value & SER != 0 {
             erase(host, (access.value >> 3 & 0xF) as usize);
@@ -202,7 +305,8 @@ impl Wiring {
             self.state.is_erasing = true;
             host.hold(true);
         }
-        if (FLASH..FLASH + FLASH_LEN).contains(&access.address) {
+        let flash = u64::from(FLASH)..u64::from(FLASH + FLASH_LEN);
+        if flash.contains(&access.address) {
             program(host, access);
         }
     }
@@ -273,11 +377,17 @@ impl Driver<Bench> for Wiring {
                 Command::Peek(address) => {
                     answer = peek(&mut session.board_mut().chip, stop.at, address);
                 }
+                Command::Interrupt(number) => {
+                    let lines = Operate::cpu(&session.board_mut().chip).interrupt_lines;
+                    let state = host.save_state().unwrap_or_default();
+                    let found = nvic::find(&state, usize::from(lines), number);
+                    answer = found.map_or(u32::MAX, nvic::Interrupt::to_word);
+                }
                 Command::TriggerIn(high) => {
                     let chip = &mut session.board_mut().chip;
-                    let (port, pin) = TRIGGER_IN;
-                    drive(chip, stop.at, port, pin, Some(Level::from(high)));
-                    if let Some(channel) = Channel::new(3) {
+                    let input = self.board.trigger_in;
+                    drive(chip, stop.at, input.wire.pin, Some(Level::from(high)));
+                    if let Some(channel) = Channel::new(input.channel) {
                         chip.drive_timer(stop.at, TIM3, |tim, registers, context| {
                             tim.drive_input(channel, Level::from(high), registers, context);
                         });
@@ -292,33 +402,40 @@ impl Driver<Bench> for Wiring {
     }
 }
 
-/// Whether an output is high. One whose pin is not given to it floats, and a pull-down holds it low.
-fn level(chip: &mut Stm32f427, output: Output) -> bool {
-    let high = |level: Option<Level>| level == Some(Level::High);
-    match output {
-        Output::Plain(port, number) => {
-            let (gpio, registers) = chip.port(port);
-            Pin::new(number).is_some_and(|pin| high(Some(gpio.level(pin, registers))))
-        }
-        Output::Timer(port, number, function, timer, channel) => {
-            let (_, registers) = chip.port(port);
-            let given = Pin::new(number).and_then(|pin| Gpio::function(pin, registers));
+/// Whether what hangs on an output is on.
+fn is_on(chip: &mut Stm32f427, output: Output) -> bool {
+    let Output { pin, source, on } = output;
+    let (port, number) = (usize::from(pin.port_index()), Pin::new(pin.number));
+    let (gpio, registers) = chip.port(port);
+    let plain = number.map(|pin| gpio.level(pin, registers));
+    let given = number.and_then(|pin| Gpio::function(pin, registers));
+    let level = match source {
+        Source::Plain => plain,
+        Source::Timer(function, timer, channel) => {
             let (tim, registers) = chip.timer(timer);
-            let output = Channel::new(channel).and_then(|channel| tim.output(channel, registers));
-            given == Some(function) && high(output)
+            let level = Channel::new(channel).and_then(|channel| tim.output(channel, registers));
+            level.filter(|_| given == Some(function))
         }
-        Output::Tim8(port, number, function, channel) => {
-            let (_, registers) = chip.port(port);
-            let given = Pin::new(number).and_then(|pin| Gpio::function(pin, registers));
+        Source::Tim8(function, channel, is_complementary) => {
             let (tim, registers) = chip.advanced_timer(TIM8);
-            let output = Channel::new(channel).and_then(|channel| tim.output(channel, registers));
-            given == Some(function) && high(output)
+            let level = Channel::new(channel).and_then(|channel| {
+                if is_complementary {
+                    tim.complementary_output(channel, registers)
+                } else {
+                    tim.output(channel, registers)
+                }
+            });
+            level.filter(|_| given == Some(function))
         }
-    }
+    };
+    level == Some(on)
 }
 
-fn drive(chip: &mut Stm32f427, at: VirtualNanos, port: usize, pin: u8, level: Option<Level>) {
-    let Some(pin) = Pin::new(pin) else { return };
+fn drive(chip: &mut Stm32f427, at: VirtualNanos, pin: PinOf, level: Option<Level>) {
+    let port = usize::from(pin.port_index());
+    let Some(pin) = Pin::new(pin.number) else {
+        return;
+    };
     chip.drive_port(at, port, |gpio, registers, context| {
         gpio.drive(pin, level, registers, context);
     });
@@ -330,14 +447,15 @@ fn peek(chip: &mut Stm32f427, at: VirtualNanos, address: u64) -> u32 {
 }
 
 /// Clock of the AHB by the clock tree's registers (RM0390, 6.3.2 and 6.3.3), Hz.
-fn hclk(chip: &mut Stm32f427) -> u64 {
+fn hclk(chip: &mut Stm32f427, crystal_hz: u32) -> u64 {
+    let crystal = u64::from(crystal_hz);
     let at = VirtualNanos(0);
     let (pll, cfgr) = (peek(chip, at, 0x4002_3804), peek(chip, at, 0x4002_3808));
     let (m, n, p) = (pll & 0x3F, pll >> 6 & 0x1FF, 2 * ((pll >> 16 & 3) + 1));
     let system = match cfgr >> 2 & 3 {
         0 => 16_000_000,
-        1 => 8_000_000,
-        _ => 8_000_000 / u64::from(m.max(1)) * u64::from(n) / u64::from(p),
+        1 => crystal,
+        _ => crystal / u64::from(m.max(1)) * u64::from(n) / u64::from(p),
     };
     let ahb = cfgr >> 4 & 0xF;
     let shift = [0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 6, 7, 8, 9][ahb as usize];
@@ -348,21 +466,21 @@ fn apb_shift(field: u32) -> u32 {
     if field & 4 == 0 { 0 } else { (field & 3) + 1 }
 }
 
-fn pclk1(chip: &mut Stm32f427) -> u64 {
+fn pclk1(chip: &mut Stm32f427, crystal_hz: u32) -> u64 {
     let shift = apb_shift(peek(chip, VirtualNanos(0), 0x4002_3808) >> 10 & 7);
-    hclk(chip) >> shift
+    hclk(chip, crystal_hz) >> shift
 }
 
-fn pclk2(chip: &mut Stm32f427) -> u64 {
+fn pclk2(chip: &mut Stm32f427, crystal_hz: u32) -> u64 {
     let shift = apb_shift(peek(chip, VirtualNanos(0), 0x4002_3808) >> 13 & 7);
-    hclk(chip) >> shift
+    hclk(chip, crystal_hz) >> shift
 }
 
 /// A sector becomes ones.
 fn erase(host: &mut dyn Host, sector: usize) {
-    let from = FLASH + SECTORS.iter().take(sector).sum::<u64>();
+    let from = FLASH + SECTORS.iter().take(sector).sum::<u32>();
     let length = SECTORS.get(sector).copied().unwrap_or(0);
-    for at in (from..from + length).step_by(4) {
+    for at in (u64::from(from)..u64::from(from + length)).step_by(4) {
         // Whatever this image's map lacks is not erased, and shows as such when it is read.
         let _ = host.program(at, Width::W32, u64::from(u32::MAX));
     }

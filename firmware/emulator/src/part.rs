@@ -7,6 +7,7 @@
 use std::num::{NonZeroU32, NonZeroU64};
 
 use anyhow::Result;
+use gonia_pins::{Board as Pins, FLASH, FLASH_LEN};
 use rigless::cpu::armv7m::windows;
 use rigless::machine::{Board, Crystal, Supply, Target, armv7m};
 use rigless::mcu::{Bare, Mcu, Operate};
@@ -14,25 +15,9 @@ use rigless::snapshot::Store;
 use rigless::soc::stm32f427::{CPU, Stm32f427};
 use rigless::soc::{Bus, Region};
 
-/// Bytes of the STM32F446RE's and ZE's flash.
-pub const FLASH_LEN: u64 = 512 << 10;
-/// Where it begins.
-pub const FLASH: u64 = 0x0800_0000;
-/// Bytes of each sector (RM0390, table 5).
-pub const SECTORS: [u64; 8] = [
-    16 << 10,
-    16 << 10,
-    16 << 10,
-    16 << 10,
-    64 << 10,
-    128 << 10,
-    128 << 10,
-    128 << 10,
-];
-
 /// The F446's memory: its flash can be programmed, which rigless's own map of the F427 leaves out.
 static MEMORY: [Region; 3] = [
-    Region::flash("flash", FLASH, FLASH_LEN)
+    Region::flash("flash", FLASH as u64, FLASH_LEN as u64)
         .erased_to(0xFF)
         .programmed_by("FLASH"),
     Region::system("system", 0x1FFF_0000, 32 << 10),
@@ -43,7 +28,6 @@ static MEMORY: [Region; 3] = [
 /// states at worst for code like this.
 const INSTRUCTIONS_S: u64 = 112_000_000;
 const CLOCK_HZ: u64 = 168_000_000;
-const HSE_HZ: u64 = 8_000_000;
 const RAIL_MV: u32 = 3_300;
 
 /// The board: a chip, its crystal, its rail.
@@ -57,9 +41,10 @@ pub struct Bench {
 
 impl Bench {
     /// A chip that has just got its power, with nothing on its pins.
-    pub fn new() -> Result<Self> {
+    pub fn new(of: &Pins) -> Result<Self> {
         let mut chip = Stm32f427::new()?;
-        chip.rcc.attach_crystals(HSE_HZ, Crystal::NONE.0);
+        let crystal_hz = u64::from(of.crystal.hz);
+        chip.rcc.attach_crystals(crystal_hz, Crystal::NONE.0);
         chip.set_supply(Supply(RAIL_MV).0);
         let peripherals: Vec<_> = chip.bus().peripherals().copied().collect();
         let map = Bare::new(Bus::builder(CPU, &MEMORY, peripherals))?;

@@ -7,6 +7,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use gonia_pins::boards::named;
+use gonia_pins::{Board, FLASH, HOST_UART};
 use gonia_protocol::NODE_ANY;
 use gonia_protocol::link::{IncomingPacket, NextAction, Requester, RetryPolicy};
 use gonia_protocol::message::{
@@ -29,11 +31,66 @@ const SLICE_US: u64 = 500;
 const HEARTBEAT_US: u64 = 250_000;
 /// The chip's side has so long for a slice.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// USART2 among the serial ports.
-const USART2: usize = 1;
+
+/// The board whose image this is: `gonia-NAME`.
+pub fn board_of(elf: &Path) -> Result<&'static Board> {
+    let name = elf.file_stem().and_then(|stem| stem.to_str());
+    let name = name.and_then(|stem| stem.strip_prefix("gonia-"));
+    name.and_then(named).with_context(|| {
+        let elf = elf.display();
+        format!("{elf}: no image of a board; name it gonia-NAME, by a board of gonia-pins")
+    })
+}
+
+/// What a board is sold with, at its worst: it leaves SysTick running, with a handler of its own that never
+/// returns, an interrupt pending, its own vector table and stack; and jumps to the image.
+fn bootloader(image: u32) -> Result<Image> {
+    /// 256 bytes below the end of the RAM that the image's stack does not reach.
+    const STACK: u32 = 0x2000_1000;
+    /// Of its code, the lowest bit set: Thumb. The vector table has 16 + 97 words.
+    const CODE: u32 = FLASH + 0x200;
+    let code: [u16; 20] = [
+        0x4809, // ldr r0, SYST_CSR
+        0x490A, // ldr r1, 1000: a tick every 1000 cycles
+        0x6041, // str r1, [r0, #4]: SYST_RVR
+        0x6081, // str r1, [r0, #8]: SYST_CVR
+        0x2107, // movs r1, #7: on, with interrupt, by the processor's clock
+        0x6001, // str r1, [r0]
+        0x4808, // ldr r0, NVIC_ISER
+        0x4909, // ldr r1, the bit of USART2, 38 - 32
+        0x6041, // str r1, [r0, #4]
+        0x30FF, // adds r0, #0xFF
+        0x3001, // adds r0, #1: NVIC_ISPR
+        0xB672, // cpsid i
+        0x6041, // str r1, [r0, #4]: pending
+        0x4807, // ldr r0, the image's vector table
+        0x6840, // ldr r0, [r0, #4]
+        0x4700, // bx r0, with interrupts off: as soon as the image allows them, they come
+        0xE7FE, // b .
+        0xBF00, 0xBF00, 0xBF00,
+    ];
+    let words = [0xE000_E010, 1000, 0xE000_E100, 1 << 6, FLASH + image];
+    let mut bytes = Vec::new();
+    bytes.extend(STACK.to_le_bytes());
+    bytes.extend((CODE | 1).to_le_bytes());
+    let hangs = CODE + 2 * 16 + 1;
+    while bytes.len() < (CODE - FLASH) as usize {
+        bytes.extend(hangs.to_le_bytes());
+    }
+    for half in code {
+        bytes.extend(half.to_le_bytes());
+    }
+    for word in words {
+        bytes.extend(u32::to_le_bytes(word));
+    }
+    let path = Path::new("bootloader");
+    Image::new(path, bytes, Some(u64::from(FLASH))).map_err(|error| anyhow!("bootloader: {error}"))
+}
 
 /// A chip under way, its arm and its host.
 pub struct Rig {
+    /// What the chip sits on.
+    pub board: &'static Board,
     /// The arm and all that is wired to the chip.
     pub world: Shared,
     commands: Sender<Command>,
@@ -51,6 +108,7 @@ pub struct Rig {
 impl Rig {
     /// Puts the image into a chip and switches it on.
     pub fn power_on(elf: &Path) -> Result<Self> {
+        let of = board_of(elf)?;
         let image =
             Image::read(elf, None).map_err(|error| anyhow!("{}: {error}", elf.display()))?;
         let world: Shared = Arc::new(Mutex::new(World::new()));
@@ -58,18 +116,22 @@ impl Rig {
         let (to_script, done) = channel();
         let wired = world.clone();
         let body = move || -> Result<Vec<String>> {
-            let mut board = Bench::new()?;
-            for axis in 0..2 {
+            let mut board = Bench::new(of)?;
+            for (axis, pins) in of.axes.iter().enumerate() {
                 let world = wired.clone();
-                board.chip.spi[axis].attach(Ring { world, axis });
+                let spi = usize::from(pins.encoder.spi) - 1;
+                board.chip.spi[spi].attach(Ring { world, axis });
             }
             let wire = HostWire {
                 world: wired.clone(),
             };
-            board.chip.usart[USART2].attach(wire);
+            board.chip.usart[usize::from(HOST_UART) - 1].attach(wire);
             let session = Session::new(Box::new(board), 0, VirtualNanos(1))?;
-            let driver = Wiring::new(wired, from_script, to_script);
-            let images = [image];
+            let driver = Wiring::new(of, wired, from_script, to_script);
+            let mut images = vec![image];
+            if of.layout.image != 0 {
+                images.push(bootloader(of.layout.image)?);
+            }
             let finished = run(session, &Start::new(&images), driver)?;
             let told = finished.session.told().map(|told| format!("{told:?}"));
             let mut gaps: Vec<String> = told.collect();
@@ -81,6 +143,7 @@ impl Rig {
             .name("chip".into())
             .spawn(body)?;
         let rig = Self {
+            board: of,
             world,
             commands,
             done,

@@ -32,6 +32,8 @@ pub struct World {
     pub resets: Vec<(u64, String)>,
     /// Sectors of flash that were erased.
     pub erases: u32,
+    /// Drivers have current, brakes have let go: each change with its time, ns.
+    pub power: Vec<(u64, bool, bool)>,
 }
 
 /// An axis: what its driver has got, and where that took it.
@@ -51,24 +53,44 @@ pub struct Axis {
     pub last_ns: u64,
     /// Shortest time from a change of direction to a step, ns.
     pub setup_ns: u64,
-    /// Shortest time between two steps, ns.
-    pub shortest_ns: u64,
+    /// Times at which the step input rose, ns.
+    pub rises: Vec<u64>,
+    /// Shortest time for which it was high, ns.
+    pub narrowest_ns: u64,
     /// Motor and encoder are wired the other way round.
     pub is_reversed: bool,
-    /// The driver has current.
-    pub is_enabled: bool,
-    /// Steps that came while it had none.
+    /// The contact of the driver's alarm output, which opens for an alarm.
+    pub alarm_closed: bool,
+    /// The driver has current, and the brake has let go.
+    can_turn: bool,
+    /// Steps that came while it was not so.
     pub unheard: u64,
     /// Clock of its encoder's SPI, Hz.
     pub ssi_hz: f64,
+    /// What the encoder speaks.
+    pub ring: RingKind,
     /// The encoder's shift register.
     pub ssi: Ssi,
 }
 
-/// A ring's SSI: latches at the first clock after its pause.
+/// What a ring speaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RingKind {
+    /// SSI.
+    Ssi,
+    /// BiSS-C, with so many bits of acknowledgement; one bit of each word flips on the way, or none.
+    BissC {
+        /// Bits of zero before the word starts.
+        acknowledgement: usize,
+        /// Which bit flips, counted from the first one.
+        flips: Option<u32>,
+    },
+}
+
+/// A ring's shift register: latches at the first clock after its pause.
 #[derive(Debug, Default)]
 pub struct Ssi {
-    word: u32,
+    word: u64,
     shifted: u32,
     last_ns: u64,
     /// Words begun.
@@ -90,29 +112,42 @@ impl Axis {
             edges: 0,
             last_ns: 0,
             setup_ns: u64::MAX,
-            shortest_ns: u64::MAX,
+            rises: Vec::new(),
+            narrowest_ns: u64::MAX,
             is_reversed: false,
-            is_enabled: false,
+            alarm_closed: true,
+            can_turn: false,
             unheard: 0,
             ssi_hz: 0.0,
+            ring: RingKind::Ssi,
             ssi: Ssi::default(),
         }
+    }
+
+    /// The axis is built otherwise; it stands where it stood at first.
+    pub fn rebuild(&mut self, change: impl FnOnce(&mut PlantConfig)) {
+        let mut config = self.plant.config().clone();
+        change(&mut config);
+        self.plant = AxisPlant::new(config, 1);
     }
 
     /// The step input rises.
     pub fn step(&mut self, now_ns: u64) {
         self.setup_ns = self.setup_ns.min(now_ns - self.turned_ns);
-        if self.edges > 0 {
-            self.shortest_ns = self.shortest_ns.min(now_ns - self.last_ns);
-        }
+        self.rises.push(now_ns);
         self.last_ns = now_ns;
         self.edges += 1;
         self.given += if self.up { 1 } else { -1 };
-        if self.is_enabled {
+        if self.can_turn {
             self.plant.step(self.up != self.is_reversed, now_ns / 1000);
         } else {
             self.unheard += 1;
         }
+    }
+
+    /// The step input falls.
+    pub fn fall(&mut self, now_ns: u64) {
+        self.narrowest_ns = self.narrowest_ns.min(now_ns - self.last_ns);
     }
 
     /// Eight clocks of the SPI, ending now: what the data line brought.
@@ -124,20 +159,56 @@ impl Axis {
             let turned = counts.map(|counts| (COUNTS - counts) % COUNTS);
             let counts = if self.is_reversed { turned } else { counts };
             // Rest bit, 18 bits of position, no error, no warning.
-            self.ssi.word = counts.map_or(0, |counts| 1 << 31 | counts << 13 | 0b11 << 11);
+            self.ssi.word = match self.ring {
+                RingKind::Ssi => counts.map_or(0, |counts| {
+                    u64::from(1 << 31 | counts << 13 | 0b11 << 11) << 32
+                }),
+                RingKind::BissC {
+                    acknowledgement,
+                    flips,
+                } => {
+                    let word = counts.map_or(u64::MAX, |counts| biss_word(counts, acknowledgement));
+                    word ^ flips.map_or(0, |bit| 1 << (63 - bit))
+                }
+            };
             self.ssi.shifted = 0;
             self.ssi.words += 1;
         }
         self.ssi.last_ns = now_ns;
-        let byte = self.ssi.word.checked_shl(8 * self.ssi.shifted).unwrap_or(0) >> 24;
+        let shifted = self.ssi.word.checked_shl(8 * self.ssi.shifted);
+        let byte = (shifted.unwrap_or(0) >> 56) as u32;
         self.ssi.shifted += 1;
-        if self.ssi_hz > RING_HZ * 1.001 {
+        if self.ring == RingKind::Ssi && self.ssi_hz > RING_HZ * 1.001 {
             // The bit on the line is the one before, here and there.
             let skew = ((self.ssi.words * 2_654_435_761) >> 7) as u32;
             return (byte ^ ((byte >> 1) & skew)) & 0xFF;
         }
         byte
     }
+}
+
+/// A word of BiSS-C, bit by bit as the line carries them, first one highest: rest, acknowledgement, start, no
+/// control data, position, no error, no warning, and the remainder of their division by x⁶ + x + 1, inverted.
+fn biss_word(counts: u32, acknowledgement: usize) -> u64 {
+    let mut checked: Vec<bool> = (0..18).rev().map(|i| counts >> i & 1 == 1).collect();
+    checked.extend([true, true]);
+    let mut division = checked.clone();
+    division.extend([false; 6]);
+    for i in 0..checked.len() {
+        if division[i] {
+            for (at, term) in [1, 0, 0, 0, 0, 1, 1].into_iter().enumerate() {
+                division[i + at] ^= term == 1;
+            }
+        }
+    }
+    let remainder = &division[checked.len()..];
+    let mut bits = vec![true, true];
+    bits.extend(vec![false; acknowledgement]);
+    bits.extend([true, false]);
+    bits.extend(&checked);
+    bits.extend(remainder.iter().map(|bit| !bit));
+    bits.resize(64, true);
+    bits.iter().fold(0, |word, &bit| word << 1 | u64::from(bit))
 }
 
 /// The relay that closes this controller's part of the chain.
@@ -230,7 +301,24 @@ impl World {
             chain_is_cut: false,
             resets: Vec::new(),
             erases: 0,
+            power: Vec::new(),
         }
+    }
+
+    /// The outputs for drivers and brakes as they are now.
+    pub fn see_power(&mut self, enabled: bool, released: bool) {
+        let is_known = self.power.last().map(|&(_, e, r)| (e, r)) == Some((enabled, released));
+        if !is_known {
+            self.power.push((self.now_ns, enabled, released));
+            for axis in &mut self.axes {
+                axis.can_turn = enabled && released;
+            }
+        }
+    }
+
+    /// Whether the drivers have their current.
+    pub fn drivers_are_on(&self) -> bool {
+        self.power.last().is_some_and(|&(_, enabled, _)| enabled)
     }
 
     /// Whether the chain is closed.

@@ -5,23 +5,60 @@ use crate::grid::Grid;
 use crate::model::Brdf;
 use rayon::prelude::*;
 
-/// A BRDF tabulated on a [`Grid`]: three planes, one a colour channel, each `n_cells` long in the
-/// order of [`Grid::cell`] (row = light, column = view).
+/// A BRDF tabulated on a [`Grid`]: a plane a channel, each `n_cells` long in the order of [`Grid::cell`] (row = light, column = view).
 #[derive(Clone, Debug, PartialEq)]
-pub struct DenseBrdf {
+pub struct DenseBrdf<const N: usize = 3> {
     grid: Grid,
-    planes: [Vec<f32>; 3],
+    planes: [Vec<f32>; N],
 }
 
-impl DenseBrdf {
-    /// Wraps three planes of values. `None` when a plane is not `grid.n_cells()` long.
-    pub fn new(grid: Grid, planes: [Vec<f32>; 3]) -> Option<Self> {
+impl<const N: usize> DenseBrdf<N> {
+    /// Wraps a plane of values a channel. `None` when a plane is not `grid.n_cells()` long.
+    pub fn new(grid: Grid, planes: [Vec<f32>; N]) -> Option<Self> {
         planes
             .iter()
             .all(|p| p.len() == grid.n_cells())
             .then_some(Self { grid, planes })
     }
 
+    /// Wraps planes that are known to be of the grid's size.
+    pub(crate) fn from_planes(grid: Grid, planes: [Vec<f32>; N]) -> Self {
+        debug_assert!(planes.iter().all(|p| p.len() == grid.n_cells()));
+        Self { grid, planes }
+    }
+
+    /// The grid of the table.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// A plane a channel.
+    pub fn planes(&self) -> &[Vec<f32>; N] {
+        &self.planes
+    }
+
+    /// Takes the planes out, to move them into a file.
+    pub fn into_planes(self) -> [Vec<f32>; N] {
+        self.planes
+    }
+
+    /// The value at a pair of direction indices.
+    pub fn at(&self, light: usize, view: usize) -> [f32; N] {
+        let cell = self.grid.cell(light, view);
+        std::array::from_fn(|c| self.planes[c][cell])
+    }
+
+    /// The value at any pair of directions, linear between the nodes in all four angles; beyond
+    /// the last polar angle the last node's value.
+    pub fn lookup(&self, light: Direction, view: Direction) -> [f32; N] {
+        let at = |i, v| Ok::<_, std::convert::Infallible>(self.at(i, v));
+        match self.grid.lookup(light, view, at) {
+            Ok(value) => value,
+        }
+    }
+}
+
+impl DenseBrdf {
     /// The table of values at pairs of direction indices.
     pub fn from_fn(grid: Grid, at: impl Fn(usize, usize) -> [f32; 3]) -> Self {
         let n = grid.n_directions();
@@ -56,42 +93,6 @@ impl DenseBrdf {
                 }
             });
         Self { grid, planes }
-    }
-
-    /// Wraps planes that are known to be of the grid's size.
-    pub(crate) fn from_planes(grid: Grid, planes: [Vec<f32>; 3]) -> Self {
-        debug_assert!(planes.iter().all(|p| p.len() == grid.n_cells()));
-        Self { grid, planes }
-    }
-
-    /// The grid of the table.
-    pub fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    /// The red, green and blue planes.
-    pub fn planes(&self) -> &[Vec<f32>; 3] {
-        &self.planes
-    }
-
-    /// Takes the planes out, to move them into a file.
-    pub fn into_planes(self) -> [Vec<f32>; 3] {
-        self.planes
-    }
-
-    /// The value at a pair of direction indices.
-    pub fn at(&self, light: usize, view: usize) -> [f32; 3] {
-        let cell = self.grid.cell(light, view);
-        [0, 1, 2].map(|c| self.planes[c][cell])
-    }
-
-    /// The value at any pair of directions, linear between the nodes in all four angles; beyond
-    /// the last polar angle the last node's value.
-    pub fn lookup(&self, light: Direction, view: Direction) -> [f32; 3] {
-        let at = |i, v| Ok::<_, std::convert::Infallible>(self.at(i, v));
-        match self.grid.lookup(light, view, at) {
-            Ok(value) => value,
-        }
     }
 }
 

@@ -129,20 +129,20 @@ impl Grid {
 
     /// The value at any pair of directions, linear in all four angles between those that `at` gives for
     /// pairs of direction indices; beyond the last polar angle the last node's value.
-    pub fn lookup<E>(
+    pub fn lookup<E, const N: usize>(
         &self,
         light: Direction,
         view: Direction,
-        mut at: impl FnMut(usize, usize) -> Result<[f32; 3], E>,
-    ) -> Result<[f32; 3], E> {
+        mut at: impl FnMut(usize, usize) -> Result<[f32; N], E>,
+    ) -> Result<[f32; N], E> {
         let views = self.corners(view);
-        let mut sum = [0.0f64; 3];
+        let mut sum = [0.0f64; N];
         for (i, wi) in self.corners(light) {
             for (v, wv) in views {
                 let weight = wi * wv;
                 if weight > 0.0 {
                     let value = at(i, v)?;
-                    for c in 0..3 {
+                    for c in 0..N {
                         sum[c] += weight * f64::from(value[c]);
                     }
                 }

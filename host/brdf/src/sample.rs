@@ -2,10 +2,10 @@
 
 use crate::direction::Direction;
 
-/// A BRDF value seen at one grid point of one frame. Single-precision degrees, because ten million
+/// A BRDF value of `N` channels seen at one grid point of one frame. Single-precision degrees, because ten million
 /// of these are kept at once and this is their form in files.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct Sample<const N: usize = 3> {
     /// Polar angle of the light at the point, degrees.
     pub theta_i_deg: f32,
     /// Azimuth of the light at the point, degrees in [0, 360).
@@ -14,25 +14,40 @@ pub struct Sample {
     pub theta_v_deg: f32,
     /// Azimuth of the view at the point, degrees in [0, 360).
     pub phi_v_deg: f32,
-    /// Value per channel: 1/sr when the reference's reflectance is known, else relative.
-    pub rgb: [f32; 3],
+    /// Value per channel, red, green and blue or what else they are: 1/sr when the reference's reflectance is known, else relative.
+    pub rgb: [f32; N],
     /// Number of the frame it came from ([`Sample::NO_FRAME`] when unknown).
     pub frame: u32,
 }
 
 impl Sample {
-    /// Frame number of samples that came without one.
+    /// Frame number of samples that came without one, of any number of channels.
     pub const NO_FRAME: u32 = u32::MAX;
+}
 
+impl<const N: usize> Sample<N> {
     /// A value seen from `view` under a light from `light`, of no frame.
-    pub fn new(light: Direction, view: Direction, rgb: [f32; 3]) -> Self {
+    pub fn new(light: Direction, view: Direction, rgb: [f32; N]) -> Self {
         Self {
             theta_i_deg: light.theta_deg() as f32,
             phi_i_deg: phi_deg(light),
             theta_v_deg: view.theta_deg() as f32,
             phi_v_deg: phi_deg(view),
             rgb,
-            frame: Self::NO_FRAME,
+            frame: Sample::NO_FRAME,
+        }
+    }
+
+    /// The same place and frame with other values.
+    #[must_use]
+    pub fn with_values<const M: usize>(&self, values: [f32; M]) -> Sample<M> {
+        Sample {
+            theta_i_deg: self.theta_i_deg,
+            phi_i_deg: self.phi_i_deg,
+            theta_v_deg: self.theta_v_deg,
+            phi_v_deg: self.phi_v_deg,
+            rgb: values,
+            frame: self.frame,
         }
     }
 

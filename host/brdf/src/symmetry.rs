@@ -81,15 +81,15 @@ impl SymmetryKind {
 
 impl Symmetry {
     /// Samples with their images, of symmetries that leave the azimuth of the sample: [`Self::order`] times as many.
-    pub fn completed(self, samples: Vec<Sample>) -> Vec<Sample> {
+    pub fn completed<const N: usize>(self, samples: Vec<Sample<N>>) -> Vec<Sample<N>> {
         let turned = |phi: f32| wrap_deg(f64::from(phi) + 180.0) as f32;
-        let image = |samples: &[Sample], of: &dyn Fn(f32) -> f32| -> Vec<Sample> {
+        let image = |samples: &[Sample<N>], of: &dyn Fn(f32) -> f32| -> Vec<Sample<N>> {
             let phi = |phi: f32| {
                 // In single precision too, where 359.99999 rounds to 360.
                 let phi = of(phi);
                 if phi < 360.0 { phi } else { 0.0 }
             };
-            let image = |s: &Sample| Sample {
+            let image = |s: &Sample<N>| Sample {
                 phi_i_deg: phi(s.phi_i_deg),
                 phi_v_deg: phi(s.phi_v_deg),
                 ..*s

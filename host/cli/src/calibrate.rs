@@ -74,7 +74,7 @@ fn print_numbers(numbers: &[Number]) {
         let show = |value: f64| format!("{value:.decimals$}");
         let state = match number.state {
             NumberState::Found => format!("{:.0} % determined", 100.0 * number.determined()),
-            NumberState::Undetermined => "kept: the frames do not tell".to_owned(),
+            NumberState::Undetermined => "the frames do not tell".to_owned(),
             NumberState::NotNeeded => "kept: the frames do not need it".to_owned(),
         };
         lines.push([

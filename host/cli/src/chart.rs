@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 /// Charts what accuracy costs. Of SAMPLES: core-seconds of a full fill against error, method by
 /// method and by stratum, with the Pareto front; then error against the number of images (methods
 /// and images, .svg and .csv). With --motion: session time against pointing error of the simulated
-/// arms, one setting changed at a time (motion.svg, motion.csv, jerk.csv).
+/// arms, one setting changed at a time (motion.svg, motion.csv, jerk.csv), and the speed over arms built
+/// otherwise (arms.csv).
 #[derive(clap::Args)]
 #[command(
     after_long_help = "Example:\n  gonia chart samples.npy --truth truth.exr --out chart\n  gonia chart --motion --out chart\n\nWithout --truth the error is that at whole frames left out (with their reciprocal ones), which\nneeds samples with frame numbers, and holds the noise of the samples too.\n\nCosts are CPU seconds. Methods that work cell by cell are timed on the cells of the tests alone;\nthe share is in the CSV."

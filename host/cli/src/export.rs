@@ -1,10 +1,10 @@
 //! `gonia export`: dense BRDFs in other people's formats.
 
+use crate::colours::read_colours;
 use crate::progress::Progress;
 use crate::table::{self, bytes, count};
 use anyhow::{Result, bail};
 use gonia_formats::check_output;
-use gonia_formats::dense::read_dense;
 use gonia_formats::foreign::{ExportSettings, ForeignWriter, export_format};
 use gonia_pipeline::export::{ExportError, export};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ impl Export {
         }
         check_output(&self.output, &[&self.dense])?;
         let progress = Progress::new();
-        let dense = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
+        let dense = progress.stage("reading the dense BRDF", |_| read_colours(&self.dense))?;
         let grid = dense.brdf.grid();
         let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
         let error = progress.stage("writing and reading back", |_| {

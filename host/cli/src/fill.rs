@@ -7,20 +7,24 @@ use crate::symmetry::SymmetryArgument;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
-use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense, write_error_bars};
-use gonia_formats::samples::read_samples_of_all;
+use gonia_formats::dense::{
+    ERRORS_OF, check_dense_name, write_channel_errors, write_dense, write_dense_channels,
+    write_error_bars,
+};
+use gonia_formats::samples::{SampleValues, read_channels_of_all};
 use gonia_formats::{check_output, checksum, is_same_file};
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{
-    DirectionalAlbedo, FillCounts, FillMethod, FillOptions, Filled, fill, fill_to_file,
+    DirectionalAlbedo, FillCounts, FillMethod, FillOptions, Filled, FilledFile, fill,
+    fill_channels, fill_channels_to_file, fill_to_file,
 };
-use gonia_rig::{SampleSet, Scale};
+use gonia_rig::{ChannelSamples, Channels, SampleSet, Scale};
 use std::path::{Path, PathBuf};
 
 /// Interpolates samples to every cell of the grid.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (N x 7, or N x 8 with the frame), .npz with one such array, or a table of text (.csv,\n.txt, .tsv) with columns theta_i, phi_i, theta_v, phi_v (degrees), r, g, b or one value (brdf) and,\nif known, frame. Other names, separators, types and orders: reference/files/samples of the book.\nTheir scale is what a table says above its header (# scale = absolute), or the note beside an array\n(NAME.npy.toml, as gonia process writes it)."
+    after_long_help = "Example:\n  gonia fill samples.npy -o dense.exr\n\nSAMPLES is .npy (N x 7, or N x 8 with the frame), .npz with one such array, or a table of text (.csv,\n.txt, .tsv) with columns theta_i, phi_i, theta_v, phi_v (degrees), r, g, b, or one value (brdf), or bands\n(380nm, 390nm, ...) and, if known, frame. The dense BRDF has their channels: R, G, B, or Y, or 380nm, ... Other names, separators, types and orders: reference/files/samples of the book.\nTheir scale is what a table says above its header (# scale = absolute), or the note beside an array\n(NAME.npy.toml, as gonia process writes it)."
 )]
 pub struct Fill {
     /// Samples, .npy, .npz or .csv; several files of one material count together
@@ -121,31 +125,28 @@ impl Fill {
         let names = self.names();
         let said = self.scale.map(Scale::from);
         let read = progress.stage("reading samples", |_| {
-            read_samples_of_all(&self.samples, said)
+            read_channels_of_all(&self.samples, said)
         })?;
         remarks::print(&read.remarks);
         let scale_row = scale::row(read.scale, said.is_some());
-        let samples = SampleSet {
-            samples: read.samples,
-            scale: read.scale.unwrap_or(Scale::Relative),
-        };
+        let scale = read.scale.unwrap_or(Scale::Relative);
         let mut facts = read.provenance;
         facts.insert("samples".to_owned(), names.clone());
-        let mut rows = if options.fits_memory()? {
-            let filled =
-                fill(samples, &options, &progress.watch()).with_context(|| names.clone())?;
-            self.write(filled, facts, &progress)?
-        } else {
-            let scale = samples.scale;
-            let filled = fill_to_file(samples, &options, &self.output, &facts, &progress.watch())
-                .with_context(|| names.clone())?;
-            remarks::print(&filled.remarks);
-            let mut rows = describe(&filled.counts, &filled.settings);
-            rows.extend(origins(&filled.origins));
-            rows.push(albedo(&filled.albedo, scale));
-            rows
+        let channels = read.values.channels().clone();
+        let filled = match read.values {
+            SampleValues::Rgb(samples) => {
+                let samples = SampleSet { samples, scale };
+                self.fill_colours(samples, &options, facts, &progress)
+            }
+            SampleValues::Channels(samples) => {
+                self.fill_channels(samples, scale, &options, facts, &progress)
+            }
         };
+        let mut rows = filled.with_context(|| names)?;
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));
+        if channels != Channels::Rgb {
+            rows.insert(4, ("channels".into(), channels.to_string()));
+        }
         rows.push(scale_row);
         rows.push(("written".into(), self.output.display().to_string()));
         for stage in progress.stages() {
@@ -153,6 +154,62 @@ impl Fill {
         }
         table::print(&rows);
         Ok(())
+    }
+
+    /// Fills samples of colours and writes what was asked for; returns what to print of it.
+    fn fill_colours(
+        &self,
+        samples: SampleSet,
+        options: &FillOptions,
+        facts: Provenance,
+        progress: &Progress,
+    ) -> Result<Vec<(String, String)>> {
+        if options.fits_memory()? {
+            let filled = fill(samples, options, &progress.watch())?;
+            return self.write(filled, facts, progress);
+        }
+        let scale = samples.scale;
+        let filled = fill_to_file(samples, options, &self.output, &facts, &progress.watch())?;
+        Ok(describe_file(&filled, scale))
+    }
+
+    /// The same of other channels.
+    fn fill_channels(
+        &self,
+        samples: ChannelSamples,
+        scale: Scale,
+        options: &FillOptions,
+        facts: Provenance,
+        progress: &Progress,
+    ) -> Result<Vec<(String, String)>> {
+        let watch = progress.watch();
+        if !options.channels_fit_memory(&samples.channels)? {
+            let filled =
+                fill_channels_to_file(samples, scale, options, &self.output, &facts, &watch)?;
+            return Ok(describe_file(&filled, scale));
+        }
+        let filled = fill_channels(samples, scale, options, &watch)?;
+        remarks::print(&filled.remarks);
+        let mut rows = describe(&filled.counts, &filled.settings);
+        rows.extend(origins(&filled.origins));
+        rows.insert(4, ("symmetry".into(), filled.symmetry));
+        rows.push(highest(&filled.albedo, scale));
+        let mut file = filled.dense;
+        let mut error_facts = file.provenance.clone();
+        if self.error.is_some() {
+            let of = checksum::of_channels(&file);
+            error_facts.insert(ERRORS_OF.to_owned(), of);
+        }
+        file.provenance.extend(facts);
+        progress.stage("writing the dense BRDF", |_| {
+            write_dense_channels(&self.output, &file)
+        })?;
+        if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
+            progress.stage("writing the error bars", |_| {
+                write_channel_errors(path, file.grid, bars, scale, &error_facts)
+            })?;
+        }
+        Ok(rows)
     }
 
     /// Writes what was asked for, and describes it.
@@ -232,21 +289,44 @@ fn origins(counts: &OriginCounts) -> [(String, String); 4] {
     .map(|(name, text)| (name.to_owned(), text))
 }
 
+/// What was written row by row.
+fn describe_file(filled: &FilledFile, scale: Scale) -> Vec<(String, String)> {
+    remarks::print(&filled.remarks);
+    let mut rows = describe(&filled.counts, &filled.settings);
+    rows.extend(origins(&filled.origins));
+    rows.push(match filled.albedo.channel_name.as_str() {
+        "R" | "G" | "B" => albedo(&filled.albedo, scale),
+        _ => highest(&filled.albedo, scale),
+    });
+    rows
+}
+
+/// The highest share of the light that is reflected, of channels that are no colours.
+fn highest(albedo: &DirectionalAlbedo, scale: Scale) -> (String, String) {
+    (
+        format!("directional albedo{}", relative(scale)),
+        format!(
+            "highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
+            albedo.highest, albedo.channel_name, albedo.theta_i_deg, albedo.phi_i_deg
+        ),
+    )
+}
+
+fn relative(scale: Scale) -> &'static str {
+    match scale {
+        Scale::Absolute => "",
+        Scale::Relative => " (relative)",
+    }
+}
+
 /// The share of the light that is reflected, in green at three polar angles, and the highest of all.
 fn albedo(albedo: &DirectionalAlbedo, scale: Scale) -> (String, String) {
     let [at_0, at_30, at_60] = [0.0, 30.0, 60.0].map(|theta| albedo.at(theta)[1]);
-    let relative = match scale {
-        Scale::Absolute => "",
-        Scale::Relative => " (relative)",
-    };
     (
-        format!("directional albedo{relative}"),
+        format!("directional albedo{}", relative(scale)),
         format!(
             "{at_0:.3}, {at_30:.3}, {at_60:.3} (G at theta_i 0, 30, 60); highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
-            albedo.highest,
-            albedo.channel_name(),
-            albedo.theta_i_deg,
-            albedo.phi_i_deg
+            albedo.highest, albedo.channel_name, albedo.theta_i_deg, albedo.phi_i_deg
         ),
     )
 }

@@ -9,6 +9,7 @@ mod calibrate;
 mod capture;
 mod chart;
 mod chart_motion;
+mod colours;
 mod compare;
 mod demo;
 mod device;

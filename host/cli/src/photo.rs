@@ -1,12 +1,12 @@
 //! `gonia photo`: a photograph of the material beside its render.
 
+use crate::colours::read_colours;
 use crate::output;
 use crate::progress::Progress;
 use crate::say::errln;
 use crate::table;
 
 use anyhow::{Result, bail};
-use gonia_formats::dense::read_dense;
 use gonia_formats::photo::read_photo;
 use gonia_formats::write_whole_bytes;
 use gonia_render as render;
@@ -115,7 +115,7 @@ impl Photo {
             );
         }
         let photo = cut(&photo, outline);
-        let file = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
+        let file = progress.stage("reading the dense BRDF", |_| read_colours(&self.dense))?;
         let lights = render::from_above(self.light_up, self.light_right);
         let size = (photo.width, photo.height);
         let picture = progress.stage("drawing", |_| {

@@ -7,14 +7,14 @@ use anyhow::{Context, Result};
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
-use gonia_formats::samples::read_samples;
-use gonia_pipeline::fit_of_samples;
-use gonia_rig::Remark;
+use gonia_formats::samples::{SampleValues, read_channels};
+use gonia_pipeline::{fit_of_samples, fits_of_channels};
+use gonia_rig::{ChannelSamples, Channels, Remark};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Reads directions from standard input (a table with the columns theta_i, phi_i, theta_v, phi_v, in
-/// degrees) and writes them with r, g, b: of a dense BRDF interpolated between the nodes, of samples as
+/// degrees) and writes them with r, g, b (or Y, or 380nm, ...: the channels that there are): of a dense BRDF interpolated between the nodes, of samples as
 /// a fit to them has it at the very directions.
 #[derive(clap::Args)]
 #[command(
@@ -48,14 +48,14 @@ impl Query {
         let rows = asked()?;
         let mut beyond = Beyond::of(brdf.grid());
         let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
+        let mut said = header(&mut out, brdf.channels());
         for asked in rows {
             if said.is_err() {
                 break;
             }
             beyond.count(asked);
             let (light, view) = pair_of(asked.angles_deg);
-            said = row(&mut out, asked.angles_deg, brdf.lookup(light, view)?);
+            said = row(&mut out, asked.angles_deg, &brdf.lookup(light, view)?);
         }
         say::written(said.and_then(|()| out.flush()))?;
         remarks::print(beyond.remark().as_slice());
@@ -63,9 +63,16 @@ impl Query {
     }
 
     fn ask_samples(self) -> Result<()> {
-        let read = read_samples(&self.dense)?;
+        let read = read_channels(&self.dense)?;
         remarks::print(&read.remarks);
-        let (fit, said_of_it) = fit_of_samples(read.samples, self.symmetry.into())
+        let channels = read.values.channels().clone();
+        let samples = match read.values {
+            SampleValues::Rgb(samples) => samples,
+            SampleValues::Channels(mut samples) => {
+                return self.ask_channels(&mut samples);
+            }
+        };
+        let (fit, said_of_it) = fit_of_samples(samples, self.symmetry.into())
             .with_context(|| self.dense.display().to_string())?;
         remarks::print(&said_of_it);
         let choice = fit.choice();
@@ -73,9 +80,36 @@ impl Query {
         let rows = asked()?;
         let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
         let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = writeln!(out, "{},r,g,b", ANGLES.join(","));
+        let mut said = header(&mut out, &channels);
         for (asked, (value, _)) in rows.into_iter().zip(fit.at_all(&pairs)) {
-            said = said.and_then(|()| row(&mut out, asked.angles_deg, value.map(|v| v as f32)));
+            said = said.and_then(|()| row(&mut out, asked.angles_deg, &value.map(|v| v as f32)));
+        }
+        say::written(said.and_then(|()| out.flush()))
+    }
+
+    /// Samples of other channels than colours: one symmetry for all, three channels a fit.
+    fn ask_channels(&self, samples: &mut ChannelSamples) -> Result<()> {
+        let (fits, said_of_it) = fits_of_channels(samples, self.symmetry.into())
+            .with_context(|| self.dense.display().to_string())?;
+        remarks::print(&said_of_it);
+        if let Some((_, fit)) = fits.first() {
+            let choice = fit.choice();
+            errln!("{} ({})", choice.settings, choice.reason);
+        }
+        let rows = asked()?;
+        let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
+        let mut values = vec![vec![0.0f32; samples.channels.count()]; rows.len()];
+        for (channels, fit) in &fits {
+            for (values, (value, _)) in values.iter_mut().zip(fit.at_all(&pairs)) {
+                for (channel, value) in channels.iter().zip(value) {
+                    values[*channel] = value as f32;
+                }
+            }
+        }
+        let mut out = BufWriter::new(std::io::stdout().lock());
+        let mut said = header(&mut out, &samples.channels);
+        for (asked, values) in rows.into_iter().zip(values) {
+            said = said.and_then(|()| row(&mut out, asked.angles_deg, &values));
         }
         say::written(said.and_then(|()| out.flush()))
     }
@@ -99,12 +133,21 @@ fn pair_of([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> (Direction, Direction)
     )
 }
 
+fn header(out: &mut impl Write, channels: &Channels) -> std::io::Result<()> {
+    let names = channels.column_names().join(",");
+    writeln!(out, "{},{names}", ANGLES.join(","))
+}
+
 fn row(
     out: &mut impl Write,
     [theta_i, phi_i, theta_v, phi_v]: [f64; 4],
-    [r, g, b]: [f32; 3],
+    values: &[f32],
 ) -> std::io::Result<()> {
-    writeln!(out, "{theta_i},{phi_i},{theta_v},{phi_v},{r},{g},{b}")
+    write!(out, "{theta_i},{phi_i},{theta_v},{phi_v}")?;
+    for value in values {
+        write!(out, ",{value}")?;
+    }
+    writeln!(out)
 }
 
 /// Directions beyond the grid's last polar angle, which have its value.

@@ -1,11 +1,11 @@
 //! `gonia render`: what a material looks like.
 
+use crate::colours::read_colours;
 use crate::output;
 use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::Brdf;
 use gonia_brdf::Elementary;
-use gonia_formats::dense::read_dense;
 use gonia_formats::frame_exr::{Precision, write_frame_as};
 use gonia_formats::photo::read_photo;
 use gonia_formats::write_whole_bytes;
@@ -76,7 +76,7 @@ impl Render {
         }
         let lights = lights_of(&self.light, self.lights)?;
         let progress = Progress::new();
-        let file = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
+        let file = progress.stage("reading the dense BRDF", |_| read_colours(&self.dense))?;
         let brdf = Tabulated::new(&file.brdf);
         let draw: fn(&dyn Brdf, &[Light], usize, usize) -> Picture = match self.shape {
             Shape::Sphere => render::sphere,

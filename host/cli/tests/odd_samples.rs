@@ -139,7 +139,20 @@ fn filled(dir: &Path, name: &str) -> (std::process::Output, Option<String>) {
     let values = dense
         .exists()
         .then(|| gonia_ok(&["query", text(&dense)], DIRECTIONS));
-    (output, values)
+    (output, values.map(|printed| as_colours(&printed)))
+}
+
+/// Rows that end in one value as those of the grey that it is.
+fn as_colours(printed: &str) -> String {
+    let Some((header, rows)) = printed.split_once(",Y\n") else {
+        return printed.to_owned();
+    };
+    let mut colours = format!("{header},r,g,b\n");
+    for row in rows.lines() {
+        let value = row.rsplit(',').next().unwrap_or_default();
+        let _ = writeln!(colours, "{row},{value},{value}");
+    }
+    colours
 }
 
 fn check(files: Vec<File>) -> Vec<Case> {
@@ -242,6 +255,12 @@ fn tables_that_are_read() -> Vec<File> {
             "one channel, `brdf`",
             "s.csv",
             table("theta_i,phi_i,theta_v,phi_v,brdf", ",", ".", 5).into(),
+            Read,
+        ),
+        (
+            "one channel, `Y`",
+            "s.csv",
+            table("theta_i,phi_i,theta_v,phi_v,Y", ",", ".", 5).into(),
             Read,
         ),
         (

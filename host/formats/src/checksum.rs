@@ -2,8 +2,9 @@
 
 use crate::FileError;
 use crc::{CRC_32_ISCSI, Crc, Digest, Table};
-use gonia_brdf::DenseBrdf;
+use gonia_brdf::{DenseBrdf, Grid};
 use gonia_rig::Frame;
+use gonia_rig::{Channels, DenseChannels};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -32,10 +33,22 @@ pub fn of_file(path: &Path) -> Result<String, FileError> {
 /// The checksum of a BRDF's values, as eight hexadecimal digits: the same in every file that holds
 /// them, whatever its header says and however it is compressed.
 pub fn of_brdf(brdf: &DenseBrdf) -> String {
+    of_planes(brdf.grid(), brdf.planes())
+}
+
+/// The same of any channels; of one value it is that of the grey that it is.
+pub fn of_channels(file: &DenseChannels) -> String {
+    match (&file.channels, &file.planes[..]) {
+        (Channels::Single, [plane]) => of_planes(file.grid, [plane; 3]),
+        _ => of_planes(file.grid, &file.planes),
+    }
+}
+
+fn of_planes<'a>(grid: Grid, planes: impl IntoIterator<Item = &'a Vec<f32>>) -> String {
     let mut digest = CRC.digest();
-    digest.update(&brdf.grid().step_deg().to_le_bytes());
+    digest.update(&grid.step_deg().to_le_bytes());
     let mut bytes = Vec::with_capacity(CHUNK);
-    for plane in brdf.planes() {
+    for plane in planes {
         for values in plane.chunks(CHUNK / 4) {
             bytes.clear();
             bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));

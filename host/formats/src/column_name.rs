@@ -1,6 +1,7 @@
 //! What a column's name says: which quantity it holds, in which unit.
 
 use crate::sample_rows::COLUMNS;
+use gonia_rig::Channels;
 
 /// The names of the field for the polar angle and for the azimuth, of the light and of the view.
 const POLAR: [&str; 3] = ["theta", "polar", "zenith"];
@@ -50,14 +51,16 @@ const VIEW: [&str; 28] = [
     "sensor",
 ];
 /// Names of the value of a single channel.
-const VALUE: [&str; 7] = ["brdf", "bsdf", "fr", "f", "value", "val", "values"];
+const VALUE: [&str; 8] = ["brdf", "bsdf", "fr", "f", "value", "val", "values", "y"];
+/// What may stand before the wavelength of a band: `brdf_450nm`.
+const OF_BANDS: [&str; 8] = ["brdf", "bsdf", "value", "val", "fr", "f", "r", "band"];
 /// Names of the channels, and what may stand before or after them.
 const CHANNELS: [[&str; 2]; 3] = [["r", "red"], ["g", "green"], ["b", "blue"]];
 const OF_CHANNELS: [&str; 6] = ["brdf", "bsdf", "value", "val", "rgb", "channel"];
 const FRAME: [&str; 4] = ["frame", "frameno", "framenr", "framenumber"];
 
 /// What a column holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Quantity {
     /// An angle: its place among the columns of a sample.
     Angle(usize),
@@ -65,12 +68,14 @@ pub(super) enum Quantity {
     Channel(usize),
     /// The value of a single channel.
     Value,
+    /// The value of a band of this wavelength, nanometres.
+    Band(f64),
     /// The number of the frame.
     Frame,
 }
 
 /// What is known of a column by its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ColumnName {
     pub quantity: Quantity,
     /// An angle in radians, as the name says.
@@ -83,6 +88,13 @@ pub(super) struct ColumnName {
 pub(super) fn column_name(name: &str) -> Option<ColumnName> {
     let name = name.trim();
     let lower = name.to_lowercase();
+    if let Some(wavelength) = wavelength(&lower) {
+        return Some(ColumnName {
+            quantity: Quantity::Band(wavelength),
+            radians: false,
+            distance: 0,
+        });
+    }
     let (words, unit) = words_and_unit(name);
     let key = words.concat();
     let quantity = quantity(&key)?;
@@ -90,7 +102,7 @@ pub(super) fn column_name(name: &str) -> Option<ColumnName> {
         Quantity::Angle(k) => Some(COLUMNS[k]),
         Quantity::Channel(c) => Some(COLUMNS[4 + c]),
         Quantity::Frame => Some(COLUMNS[7]),
-        Quantity::Value => None,
+        Quantity::Value | Quantity::Band(_) => None,
     };
     let radians = matches!(quantity, Quantity::Angle(_)) && unit == Some(AngleUnit::Radians);
     let distance = match own {
@@ -103,6 +115,16 @@ pub(super) fn column_name(name: &str) -> Option<ColumnName> {
         radians,
         distance,
     })
+}
+
+/// The wavelength in the name of a band's column: `450nm`, `450 nm [1/sr]`, `brdf_450nm`.
+fn wavelength(lower: &str) -> Option<f64> {
+    let (name, _) = without_unit(lower);
+    let name = name.trim();
+    let named = name.find(|letter: char| letter.is_ascii_digit())?;
+    let before = name[..named].trim_end_matches(['_', ' ', '-', '.']);
+    let is_band = before.is_empty() || OF_BANDS.contains(&before);
+    Channels::wavelength_of(&name[named..]).filter(|_| is_band)
 }
 
 /// Whether a line below the header holds the columns' units, some of them of angles: `deg`, `[rad]`.
@@ -276,6 +298,11 @@ mod tests {
             (Quantity::Channel(0), "r|R|red|brdf_r|R [1/sr]|value_red"),
             (Quantity::Channel(2), "b|B|Blue|BRDF_B"),
             (Quantity::Frame, "frame|Frame|frame_number|Frame No."),
+            (Quantity::Value, "Y"),
+            (
+                Quantity::Band(450.0),
+                "450nm|450 nm|450NM|450 nm [1/sr]|brdf_450nm|BRDF 450nm|450.0nm",
+            ),
         ] {
             for name in spellings.split('|') {
                 let known = column_name(name).map(|known| known.quantity);
@@ -308,7 +335,9 @@ mod tests {
             "",
             "°",
             "[deg]",
-            "brdf_450nm",
+            "u_450nm",
+            "theta_450nm",
+            "450",
             "theta_i_err",
         ] {
             assert_eq!(column_name(name), None, "{name}");

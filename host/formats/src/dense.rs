@@ -2,13 +2,13 @@
 //!
 //! A file is recognised by its first bytes, else by its ending; a name to write to by its ending.
 
-pub use crate::format::SeenRow;
-use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
+use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, TakeRow};
+pub use crate::format::{ChannelErrors, SeenRow};
 use crate::{FileError, table};
-use gonia_brdf::interpolate::{ByRows, ErrorBars};
+use gonia_brdf::interpolate::{AnyKernel, ByRows, ErrorBars, NewBlock};
 use gonia_brdf::progress::Progress;
-use gonia_brdf::{DenseBrdf, Direction, Grid};
-use gonia_rig::{DenseFile, Scale};
+use gonia_brdf::{Direction, Grid};
+use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -16,12 +16,28 @@ use std::path::Path;
 /// belong to ([`checksum::of_brdf`](crate::checksum::of_brdf)).
 pub const ERRORS_OF: &str = "dense";
 
-/// Reads a dense BRDF, gonia's or anybody's of a grid's size.
+/// Reads a dense BRDF of colours, gonia's or anybody's of a grid's size; one value is a grey.
 ///
 /// # Errors
 /// One line naming the file, and the cell where there is one: of no known format, cut short, of no
-/// grid's size, or with values that are NaN or infinite.
+/// grid's size, of bands, or with values that are NaN or infinite.
 pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
+    let file = read_dense_channels(path)?;
+    let channels = file.channels.clone();
+    file.into_rgb().ok_or_else(|| {
+        FileError::new(
+            path,
+            format_args!("has no R, G, B but {channels}"),
+            "give one of colours or of one value: bands are for gonia query, compare, render, photo and export",
+        )
+    })
+}
+
+/// Reads a dense BRDF of any channels: colours, one value (Y), or bands (380nm).
+///
+/// # Errors
+/// As [`read_dense`], but for the channels.
+pub fn read_dense_channels(path: &Path) -> Result<DenseChannels, FileError> {
     (format_of_file(path)?.read)(path)
 }
 
@@ -36,22 +52,55 @@ pub fn write_dense(path: &Path, file: DenseFile) -> Result<DenseFile, FileError>
     (writer_of_name(path)?.whole)(path, file)
 }
 
+/// Writes a dense BRDF of any channels whole: see [`write_dense`].
+///
+/// # Errors
+/// As [`write_dense`].
+pub fn write_dense_channels(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
+    (writer_of_name(path)?.channels)(path, file)
+}
+
+/// What the file of a dense BRDF that is made row by row says of it.
+pub struct RowsNote<'a> {
+    /// What the channels are: as many as the rows have.
+    pub channels: &'a Channels,
+    /// Whether the values are 1/sr.
+    pub scale: Scale,
+    /// Where the data came from, by name.
+    pub provenance: &'a BTreeMap<String, String>,
+}
+
 /// Writes a dense BRDF whole that does not fit memory, row by row as they are made. `seen` gets each row too
-/// (its number and the three channels' values), in no order and from several threads; `progress` the share
+/// (its number and the values of each channel), in no order and from several threads; `progress` the share
 /// that is done, 0 ..= 1.
 ///
 /// # Errors
 /// As [`write_dense`].
-pub fn write_dense_by_rows(
+pub fn write_dense_by_rows<const N: usize>(
     path: &Path,
     grid: Grid,
-    rows: &ByRows<'_>,
-    scale: Scale,
-    provenance: &BTreeMap<String, String>,
+    rows: &ByRows<'_, N>,
+    note: &RowsNote<'_>,
     seen: SeenRow<'_>,
     progress: &Progress<'_>,
-) -> Result<(), FileError> {
-    (writer_of_name(path)?.by_rows)(path, grid, rows, scale, provenance, seen, progress)
+) -> Result<(), FileError>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
+    let make = |take: &TakeRow<'_>| {
+        let cancelled = || std::io::Error::other("cancelled");
+        let both = |light, row: [&[f32]; N]| {
+            seen(light, &row);
+            take(light, &row)
+        };
+        rows.each_row(progress, &both, cancelled)
+    };
+    let RowsNote {
+        channels,
+        scale,
+        provenance,
+    } = *note;
+    (writer_of_name(path)?.by_rows)(path, grid, channels, scale, provenance, &make)
 }
 
 /// Writes the standard errors of a dense BRDF whole, in the unit of its values, with each cell's
@@ -63,6 +112,25 @@ pub fn write_error_bars(
     path: &Path,
     grid: Grid,
     bars: ErrorBars,
+    scale: Scale,
+    provenance: &BTreeMap<String, String>,
+) -> Result<(), FileError> {
+    let bars = ChannelErrors {
+        channels: Channels::Rgb,
+        standard_error: bars.standard_error.into(),
+        origin: bars.origin,
+    };
+    write_channel_errors(path, grid, bars, scale, provenance)
+}
+
+/// [`write_error_bars`] of any channels.
+///
+/// # Errors
+/// As [`write_dense`].
+pub fn write_channel_errors(
+    path: &Path,
+    grid: Grid,
+    bars: ChannelErrors,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
 ) -> Result<(), FileError> {
@@ -95,7 +163,7 @@ pub struct DenseLookup {
 }
 
 enum LookupSource {
-    InMemory(DenseBrdf),
+    InMemory(DenseChannels),
     OnDisk(Box<dyn CellReader>),
 }
 
@@ -108,7 +176,7 @@ impl DenseLookup {
         let format = format_of_file(path)?;
         let source = match (format.open)(path)? {
             Some(reader) => LookupSource::OnDisk(reader),
-            None => LookupSource::InMemory((format.read)(path)?.brdf),
+            None => LookupSource::InMemory((format.read)(path)?),
         };
         Ok(Self { source })
     }
@@ -116,21 +184,33 @@ impl DenseLookup {
     /// The grid.
     pub fn grid(&self) -> Grid {
         match &self.source {
-            LookupSource::InMemory(brdf) => brdf.grid(),
+            LookupSource::InMemory(brdf) => brdf.grid,
             LookupSource::OnDisk(reader) => reader.grid(),
         }
     }
 
-    /// The value (R, G, B) between the nodes: see [`Grid::lookup`].
+    /// What the channels are.
+    pub fn channels(&self) -> &Channels {
+        match &self.source {
+            LookupSource::InMemory(brdf) => &brdf.channels,
+            LookupSource::OnDisk(reader) => reader.channels(),
+        }
+    }
+
+    /// The value of each channel between the nodes: see [`Grid::lookup`].
     ///
     /// # Errors
     /// When the file cannot be read, or a value is NaN or infinite.
-    pub fn lookup(&mut self, light: Direction, view: Direction) -> Result<[f32; 3], FileError> {
+    pub fn lookup(&mut self, light: Direction, view: Direction) -> Result<Vec<f32>, FileError> {
         match &self.source {
             LookupSource::InMemory(brdf) => Ok(brdf.lookup(light, view)),
             LookupSource::OnDisk(reader) => {
-                let cell = |light, view| reader.cell(light, view);
-                reader.grid().lookup(light, view, cell)
+                let of_channel = |channel| {
+                    let cell = |light, view| Ok([reader.cell(light, view, channel)?]);
+                    let [value] = reader.grid().lookup(light, view, cell)?;
+                    Ok(value)
+                };
+                (0..reader.channels().count()).map(of_channel).collect()
             }
         }
     }
@@ -217,6 +297,96 @@ mod tests {
             assert_eq!(error.lines().count(), 1);
             assert!(DenseLookup::open(path).is_err());
         }
+    }
+
+    fn channels(channels: Channels) -> DenseChannels {
+        let grid = Grid::with_step_deg(30.0).unwrap();
+        let plane = |c: usize| (0..grid.n_cells()).map(move |k| (1000 * c + k) as f32);
+        DenseChannels {
+            planes: (0..channels.count()).map(|c| plane(c).collect()).collect(),
+            channels,
+            grid,
+            scale: Scale::Absolute,
+            provenance: [("rig".to_owned(), "a test".to_owned())].into(),
+        }
+    }
+
+    #[test]
+    fn every_channel_comes_back_from_a_file_as_what_it_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("dense.exr");
+        let bands: Vec<f64> = (0..31).map(|k| 380.0 + 30.0 * f64::from(k)).collect();
+        for kind in [
+            Channels::Single,
+            Channels::Rgb,
+            Channels::Bands(vec![532.0]),
+            Channels::Bands(vec![900.0, 1000.0, 10_600.0]),
+            Channels::Bands(bands),
+        ] {
+            let file = channels(kind.clone());
+            write_dense_channels(&path, &file).unwrap();
+            let read = read_dense_channels(&path).unwrap();
+            assert_eq!(read, file);
+            let size = std::fs::metadata(&path).unwrap().len();
+            let values = 4 * (kind.count() * file.grid.n_cells()) as u64;
+            assert!((values..values + 30_000).contains(&size), "{size}");
+            let mut lookup = DenseLookup::open(&path).unwrap();
+            assert_eq!(lookup.channels(), &kind);
+            let (light, view) = (
+                Direction::from_deg(31.0, 5.0),
+                Direction::from_deg(9.0, 77.0),
+            );
+            assert_eq!(
+                lookup.lookup(light, view).unwrap(),
+                file.lookup(light, view)
+            );
+            let as_colours = read_dense(&path);
+            if kind == Channels::Rgb {
+                assert_eq!(DenseChannels::from(as_colours.unwrap()), file);
+            } else if kind == Channels::Single {
+                let grey = as_colours.unwrap().brdf.into_planes();
+                assert_eq!(grey, [(); 3].map(|()| file.planes[0].clone()));
+            } else {
+                let error = as_colours.unwrap_err().to_string();
+                assert!(
+                    error.contains(&format!("has no R, G, B but {kind}")),
+                    "{error}"
+                );
+                assert_eq!(error.lines().count(), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn bands_of_other_programs_are_read_compressed_and_in_half_precision() {
+        use exr::prelude::*;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("others.exr");
+        let side = gonia_brdf::Grid::with_step_deg(30.0)
+            .unwrap()
+            .n_directions();
+        let plane = |value: f32| FlatSamples::F16(vec![f16::from_f32(value); side * side]);
+        let list = [
+            ("1000nm", 3.0),
+            ("400nm", 1.0),
+            ("500nm", 2.0),
+            ("alpha", 9.0),
+        ];
+        let list = list.map(|(name, value)| AnyChannel::new(name, plane(value)));
+        let layer = Layer::new(
+            (side, side),
+            LayerAttributes::default(),
+            Encoding {
+                compression: Compression::ZIP16,
+                ..Encoding::UNCOMPRESSED
+            },
+            AnyChannels::sort(list.into_iter().collect()),
+        );
+        Image::from_layer(layer).write().to_file(&path).unwrap();
+        let read = read_dense_channels(&path).unwrap();
+        assert_eq!(read.channels.names(), ["400nm", "500nm", "1000nm"]);
+        let firsts: Vec<f32> = read.planes.iter().map(|plane| plane[5]).collect();
+        assert_eq!((firsts, read.scale), (vec![1.0, 2.0, 3.0], Scale::Relative));
     }
 
     #[test]

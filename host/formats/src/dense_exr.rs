@@ -1,14 +1,12 @@
-//! A dense BRDF as a square RGB float EXR: row = light direction, column = view direction, each
+//! A dense BRDF as a square float EXR of R, G and B, of Y, or of bands (`380nm`): row = light direction, column = view direction, each
 //! counted `n_phi·iθ + iφ` (7920 × 7920 for the paper's grid).
 
-use crate::exr_planes::{ExrPlanes, NAMES, PREFIX, Plane, SCALE};
+use crate::exr_planes::{ExrPlanes, PREFIX, Plane, SCALE};
 use crate::exr_rows::{RowReader, write_rows};
-use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, SeenRow};
+use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, MakeRows, TakeRow};
 use crate::{FileError, error_exr, exr_planes};
-use gonia_brdf::interpolate::ByRows;
-use gonia_brdf::progress::Progress;
 use gonia_brdf::{DenseBrdf, Grid};
-use gonia_rig::{DenseFile, Scale};
+use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,6 +21,7 @@ pub(super) static FORMAT: Format = Format {
         open,
         write: Some(DenseWriter {
             whole: write,
+            channels: write_channels,
             by_rows: write_by_rows,
             error_bars: error_exr::write,
         }),
@@ -57,23 +56,44 @@ fn write(path: &Path, file: DenseFile) -> Result<DenseFile, FileError> {
     })
 }
 
+/// Row by row: what is held in memory is one row beside the planes.
+fn write_channels(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
+    let side = file.grid.n_directions();
+    let make = |take: &TakeRow<'_>| {
+        (0..side).try_for_each(|light| {
+            let rows: Vec<&[f32]> = file
+                .planes
+                .iter()
+                .filter_map(|plane| plane.get(light * side..(light + 1) * side))
+                .collect();
+            if rows.len() < file.channels.count() {
+                return Err(std::io::Error::other("a plane is smaller than the grid"));
+            }
+            take(light, &rows)
+        })
+    };
+    write_by_rows(
+        path,
+        file.grid,
+        &file.channels,
+        file.scale,
+        &file.provenance,
+        &make,
+    )
+}
+
 fn write_by_rows(
     path: &Path,
     grid: Grid,
-    rows: &ByRows<'_>,
+    channels: &Channels,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
-    seen: SeenRow<'_>,
-    progress: &Progress<'_>,
+    make: MakeRows<'_>,
 ) -> Result<(), FileError> {
     let attributes = exr_planes::own_attributes(scale, provenance);
-    write_rows(path, grid.n_directions(), &attributes, |writer| {
-        let cancelled = || std::io::Error::other("cancelled");
-        let take = |light, row: [&[f32]; 3]| {
-            seen(light, row);
-            writer.write(light, row)
-        };
-        rows.each_row(progress, &take, cancelled)
+    let (side, names) = (grid.n_directions(), channels.names());
+    write_rows(path, side, &names, &attributes, |writer| {
+        make(&|light, row: &[&[f32]]| writer.write(light, row))
     })
 }
 
@@ -101,16 +121,18 @@ impl CellReader for OnDisk {
         self.grid
     }
 
-    fn cell(&self, light: usize, view: usize) -> Result<[f32; 3], FileError> {
+    fn channels(&self) -> &Channels {
+        self.reader.channels()
+    }
+
+    fn cell(&self, light: usize, view: usize, channel: usize) -> Result<f32, FileError> {
         let value = self
             .reader
-            .value(light, view)
+            .value(light, view, channel)
             .map_err(|error| FileError::reading(&self.path, &error))?;
-        for (channel, name) in NAMES.iter().enumerate() {
-            if !value[channel].is_finite() {
-                let place = (light, view);
-                return Err(no_value(&self.path, self.grid, name, place, value[channel]));
-            }
+        if !value.is_finite() {
+            let name = &self.channels().names()[channel];
+            return Err(no_value(&self.path, self.grid, name, (light, view), value));
         }
         Ok(value)
     }
@@ -121,10 +143,14 @@ fn rebuilt(path: &Path, grid: Grid, planes: [Vec<f32>; 3]) -> Result<DenseBrdf, 
         .ok_or_else(|| FileError::new(path, "its planes differ in size", "copy or make it again"))
 }
 
-/// Reads gonia's or anybody's square RGB EXR of a grid's size. One that does not say its scale counts
-/// as relative.
-fn read(path: &Path) -> Result<DenseFile, FileError> {
-    let (grid, planes, attributes) = match read_plain(path)? {
+/// Reads gonia's or anybody's square EXR of a grid's size. One that does not say its scale counts as relative.
+fn read(path: &Path) -> Result<DenseChannels, FileError> {
+    let FileContent {
+        grid,
+        channels,
+        planes,
+        attributes,
+    } = match read_plain(path)? {
         Some(read) => read,
         None => read_any(path)?,
     };
@@ -145,17 +171,24 @@ fn read(path: &Path) -> Result<DenseFile, FileError> {
         .filter(|(name, _)| *name != SCALE)
         .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
         .collect();
-    let brdf = rebuilt(path, grid, planes)?;
-    check_finite(path, &brdf)?;
-    Ok(DenseFile {
-        brdf,
+    let file = DenseChannels {
+        channels,
+        grid,
+        planes,
         scale,
         provenance,
-    })
+    };
+    check_finite(path, &file)?;
+    Ok(file)
 }
 
-/// The grid, the planes and the text attributes of a file.
-type FileContent = (Grid, [Vec<f32>; 3], BTreeMap<String, String>);
+/// What a file holds, with its text attributes.
+struct FileContent {
+    grid: Grid,
+    channels: Channels,
+    planes: Vec<Vec<f32>>,
+    attributes: BTreeMap<String, String>,
+}
 
 /// A file as gonia writes it, by all threads; `None` when it is another kind, or damaged.
 fn read_plain(path: &Path) -> Result<Option<FileContent>, FileError> {
@@ -168,10 +201,15 @@ fn read_plain(path: &Path) -> Result<Option<FileContent>, FileError> {
     let planes = reader
         .read_all()
         .map_err(|error| FileError::reading(path, &error))?;
-    Ok(planes.map(|planes| (grid, planes, reader.attributes().clone())))
+    Ok(planes.map(|planes| FileContent {
+        grid,
+        channels: reader.channels().clone(),
+        planes,
+        attributes: reader.attributes().clone(),
+    }))
 }
 
-/// Any square RGB EXR of a grid's size.
+/// Any square EXR of a grid's size.
 fn read_any(path: &Path) -> Result<FileContent, FileError> {
     let no_grid = |width, height| {
         let size = format!("is {width} × {height} pixels, which no grid has");
@@ -188,22 +226,27 @@ fn read_any(path: &Path) -> Result<FileContent, FileError> {
         let (problem, remedy) = no_grid(image.width, image.height);
         FileError::new(path, problem, remedy)
     })?;
-    Ok((grid, image.planes.map(Plane::into_f32), image.attributes))
+    Ok(FileContent {
+        grid,
+        channels: image.channels,
+        planes: image.planes.into_iter().map(Plane::into_f32).collect(),
+        attributes: image.attributes,
+    })
 }
 
-fn check_finite(path: &Path, brdf: &DenseBrdf) -> Result<(), FileError> {
-    let grid = brdf.grid();
+fn check_finite(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
+    let grid = file.grid;
     let side = grid.n_directions();
     // A row at a time without a way out: several values are looked at at once.
     let is_whole = |row: &[f32]| row.iter().fold(true, |whole, v| whole & v.is_finite());
-    for (plane, name) in brdf.planes().iter().zip(NAMES) {
+    for (plane, name) in file.planes.iter().zip(file.channels.names()) {
         let rows = plane.par_chunks(side);
         let Some(light) = rows.position_first(|row| !is_whole(row)) else {
             continue;
         };
         let row = &plane[light * side..][..side];
         if let Some(view) = row.iter().position(|value| !value.is_finite()) {
-            return Err(no_value(path, grid, name, (light, view), row[view]));
+            return Err(no_value(path, grid, &name, (light, view), row[view]));
         }
     }
     Ok(())

@@ -1,5 +1,6 @@
-//! Three planes R, G, B of an EXR file: what frames and dense BRDFs have in common.
+//! Planes of an EXR file: what frames and dense BRDFs have in common.
 
+use crate::exr_channels::{Named, named};
 use crate::exr_header::sort_attributes;
 use crate::{FileError, write_whole};
 use exr::meta::attribute::{AttributeValue, SampleType};
@@ -7,7 +8,7 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes,
     MetaData, ReadChannels, ReadLayers, Text, WritableImage, f16,
 };
-use gonia_rig::Scale;
+use gonia_rig::{Channels, Scale};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
@@ -19,12 +20,12 @@ pub(super) const PREFIX: &str = "gonia.";
 /// The attribute that holds the [`Scale`].
 pub(super) const SCALE: &str = "gonia.scale";
 
-/// Three planes of one file, row by row from the top left.
+/// Planes R, G and B of one file that is written, row by row from the top left.
 pub(super) struct ExrPlanes {
     pub width: usize,
     pub height: usize,
     pub planes: [Plane; 3],
-    /// A channel beside R, G and B, by name: written, never read.
+    /// A channel beside R, G and B, by name.
     pub extra: Option<(&'static str, Plane)>,
     /// The text attributes of the file, by name.
     pub attributes: BTreeMap<String, String>,
@@ -55,12 +56,22 @@ impl From<Plane> for FlatSamples {
     }
 }
 
-/// Reads the R, G and B planes of a file. `check` sees the size before anything large is
+/// Planes of some channels of one file, row by row from the top left.
+pub(super) struct NamedPlanes {
+    pub width: usize,
+    pub height: usize,
+    pub channels: Channels,
+    pub planes: Vec<Plane>,
+    /// The text attributes of the file, by name.
+    pub attributes: BTreeMap<String, String>,
+}
+
+/// Reads the planes of a file that are values: see [`named`]. `check` sees the size before anything large is
 /// allocated, and may refuse it with (problem, remedy).
 pub(super) fn read(
     path: &Path,
     check: impl FnOnce(usize, usize) -> Result<(), (String, String)>,
-) -> Result<ExrPlanes, FileError> {
+) -> Result<NamedPlanes, FileError> {
     let meta = MetaData::read_from_file(path, false).map_err(|error| unreadable(path, error))?;
     let [header] = meta.headers.as_slice() else {
         return Err(FileError::new(
@@ -76,15 +87,13 @@ pub(super) fn read(
             "save it as a flat image",
         ));
     }
-    for name in NAMES {
-        let channel = header
-            .channels
-            .list
-            .iter()
-            .find(|channel| channel.name.eq(name));
-        let Some(channel) = channel else {
-            return Err(missing_channel(path, name, header));
-        };
+    let list = &header.channels.list;
+    let there: Vec<String> = list.iter().map(|c| c.name.to_string()).collect();
+    let Named { channels, places } =
+        named(&there).map_err(|(problem, remedy)| FileError::new(path, problem, remedy))?;
+    let names: Vec<String> = places.iter().map(|k| there[*k].clone()).collect();
+    for place in places {
+        let (channel, name) = (&list[place], &there[place]);
         if channel.sample_type == SampleType::U32 {
             return Err(FileError::new(
                 path,
@@ -113,12 +122,12 @@ pub(super) fn read(
         .all_attributes()
         .from_file(path)
         .map_err(|error| unreadable(path, error))?;
-    let planes = take_planes(path, image.layer_data.channel_data)?;
-    Ok(ExrPlanes {
+    let planes = take_planes(path, image.layer_data.channel_data, &names)?;
+    Ok(NamedPlanes {
         width,
         height,
+        channels,
         planes,
-        extra: None,
         attributes,
     })
 }
@@ -152,20 +161,6 @@ fn check_promise(path: &Path, header: &exr::meta::header::Header) -> Result<(), 
         ),
         "copy or make it again",
     ))
-}
-
-fn missing_channel(path: &Path, name: &str, header: &exr::meta::header::Header) -> FileError {
-    let there: Vec<String> = header
-        .channels
-        .list
-        .iter()
-        .map(|channel| channel.name.to_string())
-        .collect();
-    FileError::new(
-        path,
-        format_args!("has no channel {name}, only {}", there.join(", ")),
-        "save it as RGB, with channels R, G and B",
-    )
 }
 
 /// The text attributes of a file, by name.
@@ -231,7 +226,8 @@ pub(super) fn write(path: &Path, image: ExrPlanes) -> Result<[Plane; 3], FileErr
         image.write().to_buffered(&mut *file).map_err(to_io)?;
         sort_attributes(file)
     })?;
-    take_planes(path, image.layer_data.channel_data)
+    let planes = take_planes(path, image.layer_data.channel_data, &NAMES)?;
+    planes.try_into().map_err(|_| changed(path))
 }
 
 /// An error of the `exr` crate while a file is written.
@@ -276,22 +272,27 @@ pub(super) fn layer_attributes(
     Ok(layer)
 }
 
-/// The planes R, G and B out of an image, without copying them.
-fn take_planes(path: &Path, channels: AnyChannels<FlatSamples>) -> Result<[Plane; 3], FileError> {
+/// The planes of some names out of an image, without copying them.
+fn take_planes(
+    path: &Path,
+    channels: AnyChannels<FlatSamples>,
+    names: &[impl AsRef<str>],
+) -> Result<Vec<Plane>, FileError> {
     let mut list = channels.list;
-    let mut take = |name: &str| {
+    let take = |name: &_| {
+        let name: &str = AsRef::as_ref(name);
         let place = list.iter().position(|channel| channel.name.eq(name));
         match place.map(|place| list.remove(place).sample_data) {
             Some(FlatSamples::F16(values)) => Ok(Plane::F16(values)),
             Some(FlatSamples::F32(values)) => Ok(Plane::F32(values)),
-            Some(FlatSamples::U32(_)) | None => Err(FileError::new(
-                path,
-                "changed while it was read",
-                "try again",
-            )),
+            Some(FlatSamples::U32(_)) | None => Err(changed(path)),
         }
     };
-    Ok([take("R")?, take("G")?, take("B")?])
+    names.iter().map(take).collect()
+}
+
+fn changed(path: &Path) -> FileError {
+    FileError::new(path, "changed while it was read", "try again")
 }
 
 fn latin(text: &str) -> String {

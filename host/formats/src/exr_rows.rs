@@ -1,9 +1,11 @@
-//! An uncompressed RGB float EXR written and read row by row, in any order: for images that do not fit
+//! An uncompressed float EXR of any channels written and read row by row, in any order: for images that do not fit
 //! memory, for a few values of a large one, and for all of them by several threads.
 //!
 //! Such a file is a header, a table of 8-byte offsets, and for each row its number and its length (two
-//! 4-byte integers) before the values of B, G and R, all little-endian.
+//! 4-byte integers) before the values of its channels, which stand in the order of their names (B, G, R), all
+//! little-endian.
 
+use crate::exr_channels::{Named, named};
 use crate::exr_header::sort_attributes;
 use crate::exr_planes::{layer_attributes, text_attributes, to_io};
 use crate::read_at::read_exact_at;
@@ -14,6 +16,7 @@ use exr::math::Vec2;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData, Requirements, magic_number};
+use gonia_rig::Channels;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -21,8 +24,6 @@ use std::io::{self, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// The channels in the order of the file, and where each is in `[_; 3]`.
-const CHANNELS: [(&str, usize); 3] = [("B", 2), ("G", 1), ("R", 0)];
 /// Bytes before the values of a row.
 const ROW_HEAD: u64 = 8;
 
@@ -32,17 +33,19 @@ pub(super) struct RowWriter<'a> {
     /// Where row 0 begins.
     start: u64,
     width: usize,
+    /// Which channel comes when.
+    order: Vec<usize>,
 }
 
 impl RowWriter<'_> {
-    /// Writes a row, from any thread. Each is to be written once.
-    pub fn write(&self, row: usize, values: [&[f32]; 3]) -> io::Result<()> {
-        let size = 12 * self.width;
+    /// Writes a row, from any thread: the values of each channel. Each row is to be written once.
+    pub fn write(&self, row: usize, values: &[&[f32]]) -> io::Result<()> {
+        let size = 4 * self.order.len() * self.width;
         let mut bytes = Vec::with_capacity(ROW_HEAD as usize + size);
         bytes.extend((row as i32).to_le_bytes());
         bytes.extend((size as i32).to_le_bytes());
-        for (_, channel) in CHANNELS {
-            bytes.extend(values[channel].iter().flat_map(|v| v.to_le_bytes()));
+        for channel in &self.order {
+            bytes.extend(values[*channel].iter().flat_map(|v| v.to_le_bytes()));
         }
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.seek(SeekFrom::Start(
@@ -52,17 +55,20 @@ impl RowWriter<'_> {
     }
 }
 
-/// Writes a square image whole; `fill` gives its rows.
+/// Writes a square image of some channels whole; `fill` gives its rows.
 pub(super) fn write_rows(
     path: &Path,
     side: usize,
+    names: &[String],
     attributes: &BTreeMap<String, String>,
     fill: impl FnOnce(&RowWriter<'_>) -> io::Result<()>,
 ) -> Result<(), FileError> {
     let own = layer_attributes(path, attributes)?;
-    let channels = CHANNELS
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    order.sort_by(|a, b| names[*a].as_bytes().cmp(names[*b].as_bytes()));
+    let channels = order
         .iter()
-        .map(|(name, _)| ChannelDescription::named(*name, SampleType::F32))
+        .map(|k| ChannelDescription::named(&*names[*k], SampleType::F32))
         .collect();
     let header = Header::new(Text::default(), (side, side), channels)
         .with_encoding(
@@ -79,7 +85,7 @@ pub(super) fn write_rows(
         Header::write_all(&headers, file, false).map_err(to_io)?;
         sort_attributes(file)?;
         let start = file.stream_position()? + 8 * side as u64;
-        let row_bytes = ROW_HEAD + 12 * side as u64;
+        let row_bytes = ROW_HEAD + 4 * order.len() as u64 * side as u64;
         for row in 0..side as u64 {
             file.write_all(&(start + row * row_bytes).to_le_bytes())?;
         }
@@ -87,6 +93,7 @@ pub(super) fn write_rows(
             file: Mutex::new(file),
             start,
             width: side,
+            order,
         })
     })
 }
@@ -98,6 +105,8 @@ pub(super) struct RowReader {
     offsets: Vec<u64>,
     /// The number of the first row in the file.
     first: i32,
+    /// What its channels are, and where each stands in a row.
+    named: Named,
     attributes: BTreeMap<String, String>,
 }
 
@@ -120,14 +129,16 @@ impl RowReader {
             return None;
         };
         let channels = &header.channels.list;
-        let named = channels.len() == CHANNELS.len()
-            && channels.iter().zip(CHANNELS).all(|(channel, (name, _))| {
-                channel.name.eq(name)
-                    && channel.sample_type == SampleType::F32
-                    && channel.sampling == Vec2(1, 1)
-            });
+        let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+        let named = named(&names)
+            .ok()
+            .filter(|named| named.places.len() == names.len())?;
+        let is_single = channels
+            .iter()
+            .all(|c| c.sample_type == SampleType::F32 && c.sampling == Vec2(1, 1));
+        let pixel = 4 * channels.len() as u64;
         let side = header.layer_size.width();
-        let plain = named
+        let plain = is_single
             && header.compression == Compression::Uncompressed
             && header.blocks == BlockDescription::ScanLines
             && !header.deep
@@ -143,18 +154,19 @@ impl RowReader {
             .next()?;
         let length = file.metadata().ok()?.len();
         let whole = |offset: &u64| {
-            let end = offset.checked_add(ROW_HEAD + 12 * side as u64);
+            let end = offset.checked_add(ROW_HEAD + pixel * side as u64);
             end.is_some_and(|end| end <= length)
         };
         // Rows that share their bytes would be a small file of a large image.
         let holds_all = (side as u64)
-            .checked_mul(ROW_HEAD + 12 * side as u64)
+            .checked_mul(ROW_HEAD + pixel * side as u64)
             .is_some_and(|bytes| bytes <= length);
         let is_whole = holds_all && offsets.len() == side && offsets.iter().all(whole);
         is_whole.then_some(Self {
             file,
             offsets,
             first,
+            named,
             attributes,
         })
     }
@@ -169,39 +181,42 @@ impl RowReader {
         &self.attributes
     }
 
-    /// The value of a pixel.
-    pub fn value(&self, row: usize, column: usize) -> io::Result<[f32; 3]> {
-        let mut value = [0.0; 3];
-        for (place, (_, channel)) in CHANNELS.iter().enumerate() {
-            let before = (place * self.side() + column) as u64;
-            let mut bytes = [0; 4];
-            let at = self.offsets[row] + ROW_HEAD + 4 * before;
-            read_exact_at(&self.file, &mut bytes, at)?;
-            value[*channel] = f32::from_le_bytes(bytes);
-        }
-        Ok(value)
+    /// What the channels are.
+    pub fn channels(&self) -> &Channels {
+        &self.named.channels
     }
 
-    /// All of it, R, G and B, by all threads; `None` when a row is not where the file says.
-    pub fn read_all(&self) -> io::Result<Option<[Vec<f32>; 3]>> {
-        let side = self.side();
-        let mut planes = [(); 3].map(|()| vec![0.0; side * side]);
-        let [red, green, blue] = &mut planes;
-        let rows = red
-            .par_chunks_mut(side)
-            .zip(green.par_chunks_mut(side))
-            .zip(blue.par_chunks_mut(side));
-        let in_place = rows.enumerate().map_init(
-            || vec![0; ROW_HEAD as usize + 12 * side],
-            |bytes, (row, ((red, green), blue))| {
+    /// The value of a pixel in a channel.
+    pub fn value(&self, row: usize, column: usize, channel: usize) -> io::Result<f32> {
+        let before = (self.named.places[channel] * self.side() + column) as u64;
+        let mut bytes = [0; 4];
+        let at = self.offsets[row] + ROW_HEAD + 4 * before;
+        read_exact_at(&self.file, &mut bytes, at)?;
+        Ok(f32::from_le_bytes(bytes))
+    }
+
+    /// All of it, a plane a channel, by all threads; `None` when a row is not where the file says.
+    pub fn read_all(&self) -> io::Result<Option<Vec<Vec<f32>>>> {
+        let (side, n) = (self.side(), self.named.places.len());
+        let mut planes: Vec<Vec<f32>> = (0..n).map(|_| vec![0.0; side * side]).collect();
+        // Of each row the places of its values, in the order of the channels.
+        let mut rows: Vec<Vec<&mut [f32]>> = (0..side).map(|_| Vec::with_capacity(n)).collect();
+        for plane in &mut planes {
+            for (row, values) in rows.iter_mut().zip(plane.chunks_mut(side)) {
+                row.push(values);
+            }
+        }
+        let size = 4 * n * side;
+        let in_place = rows.into_par_iter().enumerate().map_init(
+            || vec![0; ROW_HEAD as usize + size],
+            |bytes, (row, out)| {
                 read_exact_at(&self.file, bytes, self.offsets[row])?;
                 let (head, values) = bytes.split_at(ROW_HEAD as usize);
                 let number = i64::from(self.first) + row as i64;
-                let expected = [number as i32, 12 * side as i32].map(i32::to_le_bytes);
-                let out = [red, green, blue];
-                for (bytes, (_, channel)) in values.chunks_exact(4 * side).zip(CHANNELS) {
-                    let values = bytes.as_chunks().0.iter();
-                    for (value, bytes) in out[channel].iter_mut().zip(values) {
+                let expected = [number as i32, size as i32].map(i32::to_le_bytes);
+                for (out, place) in out.into_iter().zip(&self.named.places) {
+                    let values = values[4 * side * place..][..4 * side].as_chunks().0.iter();
+                    for (value, bytes) in out.iter_mut().zip(values) {
                         *value = f32::from_le_bytes(*bytes);
                     }
                 }
@@ -229,10 +244,10 @@ mod tests {
                 .collect()
         };
         let attributes = BTreeMap::from([("gonia.scale".to_owned(), "relative".to_owned())]);
-        write_rows(&path, side, &attributes, |writer| {
+        write_rows(&path, side, &Channels::Rgb.names(), &attributes, |writer| {
             for row in (0..side).rev() {
                 let planes = [0, 1, 2].map(|c| plane(c, row));
-                writer.write(row, planes.each_ref().map(Vec::as_slice))?;
+                writer.write(row, &planes.each_ref().map(Vec::as_slice))?;
             }
             Ok(())
         })
@@ -252,7 +267,7 @@ mod tests {
             assert_eq!(read, whole[c]);
             for row in 0..side {
                 assert_eq!(read[row * side..(row + 1) * side], plane(c, row));
-                assert_eq!(reader.value(row, 7).unwrap()[c], plane(c, row)[7]);
+                assert_eq!(reader.value(row, 7, c).unwrap(), plane(c, row)[7]);
             }
         }
     }
@@ -276,8 +291,10 @@ mod tests {
         exr_planes::write(&path, image).unwrap();
         let planes = std::fs::read(&path).unwrap();
         for _ in 0..20 {
-            write_rows(&path, 12, &attributes, |writer| {
-                (0..12).rev().try_for_each(|k| writer.write(k, [&row; 3]))
+            write_rows(&path, 12, &Channels::Rgb.names(), &attributes, |writer| {
+                (0..12)
+                    .rev()
+                    .try_for_each(|k| writer.write(k, &[&row[..]; 3]))
             })
             .unwrap();
             let header = planes.len() - 12 * (16 + 12 * 12);
@@ -290,12 +307,19 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("rows.exr");
         let full = || io::Error::from(io::ErrorKind::StorageFull);
-        write_rows(&path, 12, &BTreeMap::new(), |_| Err(full())).unwrap_err();
+        write_rows(&path, 12, &Channels::Rgb.names(), &BTreeMap::new(), |_| {
+            Err(full())
+        })
+        .unwrap_err();
         assert!(!path.exists());
         let row = [0.5; 12];
-        write_rows(&path, 12, &BTreeMap::new(), |writer| {
-            (0..12).try_for_each(|k| writer.write(k, [&row; 3]))
-        })
+        write_rows(
+            &path,
+            12,
+            &Channels::Rgb.names(),
+            &BTreeMap::new(),
+            |writer| (0..12).try_for_each(|k| writer.write(k, &[&row[..]; 3])),
+        )
         .unwrap();
         let length = std::fs::metadata(&path).unwrap().len();
         let file = File::options().write(true).open(&path).unwrap();
@@ -308,9 +332,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("rows.exr");
         let row = [0.5; 12];
-        write_rows(&path, 12, &BTreeMap::new(), |writer| {
-            (0..12).try_for_each(|k| writer.write(k, [&row; 3]))
-        })
+        write_rows(
+            &path,
+            12,
+            &Channels::Rgb.names(),
+            &BTreeMap::new(),
+            |writer| (0..12).try_for_each(|k| writer.write(k, &[&row[..]; 3])),
+        )
         .unwrap();
         let reader = RowReader::open(&path).unwrap().unwrap();
         assert!(reader.read_all().unwrap().is_some());

@@ -3,11 +3,10 @@
 //! A new format is one file that defines a [`Format`], and one row in [`crate::table`].
 
 use crate::FileError;
-use gonia_brdf::interpolate::{ByRows, ErrorBars};
-use gonia_brdf::progress::Progress;
 use gonia_brdf::{Brdf, Grid, Sample};
-use gonia_rig::{DenseFile, Remark, Scale};
+use gonia_rig::{ChannelSamples, Channels, DenseChannels, DenseFile, Remark, Scale};
 use std::collections::BTreeMap;
+use std::io;
 use std::path::Path;
 
 /// A file format of dense BRDFs, of samples, or of other people's measurements.
@@ -35,7 +34,7 @@ pub(crate) enum Content {
 /// How a dense BRDF is read and written.
 pub(crate) struct DenseFormat {
     /// Reads a file whole.
-    pub read: fn(&Path) -> Result<DenseFile, FileError>,
+    pub read: fn(&Path) -> Result<DenseChannels, FileError>,
     /// Opens a file of which a few cells are wanted; `None` for a file that must be read whole.
     pub open: OpenCells,
     /// Absent where the format is only read.
@@ -46,6 +45,8 @@ pub(crate) struct DenseFormat {
 pub(crate) struct DenseWriter {
     /// From memory.
     pub whole: fn(&Path, DenseFile) -> Result<DenseFile, FileError>,
+    /// From memory, of any channels.
+    pub channels: fn(&Path, &DenseChannels) -> Result<(), FileError>,
     /// Row by row, as they are made.
     pub by_rows: WriteRows,
     /// The standard errors that belong to it.
@@ -59,34 +60,52 @@ pub(crate) type OpenCells = fn(&Path) -> Result<Option<Box<dyn CellReader>>, Fil
 pub(crate) type WriteRows = fn(
     &Path,
     Grid,
-    &ByRows<'_>,
+    &Channels,
     Scale,
     &BTreeMap<String, String>,
-    SeenRow<'_>,
-    &Progress<'_>,
+    MakeRows<'_>,
 ) -> Result<(), FileError>;
 
-/// Gets every row of light (its number, the values of its views in three channels), in no order and from
+/// Makes all rows of a dense BRDF and gives each to a function, in no order and from several threads.
+pub(crate) type MakeRows<'a> = &'a dyn Fn(&TakeRow<'_>) -> io::Result<()>;
+
+/// Takes a row of light: its number, and of each channel the values of its views.
+pub(crate) type TakeRow<'a> = dyn Fn(usize, &[&[f32]]) -> io::Result<()> + Sync + 'a;
+
+/// Gets every row of light (its number, and of each channel the values of its views), in no order and from
 /// several threads.
-pub type SeenRow<'a> = &'a (dyn Fn(usize, [&[f32]; 3]) + Sync);
+pub type SeenRow<'a> = &'a (dyn Fn(usize, &[&[f32]]) + Sync);
+
+/// Standard errors of a dense BRDF of any channels.
+pub struct ChannelErrors {
+    /// What the planes are of.
+    pub channels: Channels,
+    /// A plane a channel, in the unit of the values.
+    pub standard_error: Vec<Vec<f32>>,
+    /// An [`Origin`](gonia_brdf::interpolate::Origin) a cell.
+    pub origin: Vec<u8>,
+}
 
 /// See [`crate::dense::write_error_bars`].
 pub(crate) type WriteErrorBars =
-    fn(&Path, Grid, ErrorBars, Scale, &BTreeMap<String, String>) -> Result<(), FileError>;
+    fn(&Path, Grid, ChannelErrors, Scale, &BTreeMap<String, String>) -> Result<(), FileError>;
 
 /// A file open for reading single cells.
 pub(crate) trait CellReader: Send {
     /// The grid.
     fn grid(&self) -> Grid;
 
-    /// The value (R, G, B) of a cell by the indices of its light and view directions.
+    /// What the channels are.
+    fn channels(&self) -> &Channels;
+
+    /// The value of a cell, by the indices of its light and view directions, in a channel.
     ///
     /// # Errors
     /// When the file cannot be read, or the value is NaN or infinite.
-    fn cell(&self, light: usize, view: usize) -> Result<[f32; 3], FileError>;
+    fn cell(&self, light: usize, view: usize, channel: usize) -> Result<f32, FileError>;
 }
 
-/// Samples as a file holds them.
+/// Samples of colours as a file holds them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SamplesRead {
     /// The samples, in the order of the file.
@@ -99,6 +118,111 @@ pub struct SamplesRead {
     pub remarks: Vec<Remark>,
 }
 
+/// The samples of a file: colours, or what else its columns are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SampleValues {
+    /// Of red, green and blue.
+    Rgb(Vec<Sample>),
+    /// Of other channels.
+    Channels(ChannelSamples),
+}
+
+impl SampleValues {
+    /// What the values are of.
+    pub fn channels(&self) -> &Channels {
+        match self {
+            Self::Rgb(_) => &Channels::Rgb,
+            Self::Channels(samples) => &samples.channels,
+        }
+    }
+
+    /// How many samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Rgb(samples) => samples.len(),
+            Self::Channels(samples) => samples.places.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The frame numbers, to be changed.
+    pub(crate) fn frames_mut(&mut self) -> Box<dyn Iterator<Item = &mut u32> + '_> {
+        match self {
+            Self::Rgb(samples) => Box::new(samples.iter_mut().map(|s| &mut s.frame)),
+            Self::Channels(samples) => Box::new(samples.places.iter_mut().map(|s| &mut s.frame)),
+        }
+    }
+
+    /// Appends samples; `false`, and nothing is done, where their channels are others.
+    pub(crate) fn append(&mut self, more: &mut Self) -> bool {
+        match (self, more) {
+            (Self::Rgb(all), Self::Rgb(more)) => all.append(more),
+            (Self::Channels(all), Self::Channels(more)) if all.channels == more.channels => {
+                all.places.append(&mut more.places);
+                all.values.append(&mut more.values);
+            }
+            _ => return false,
+        }
+        true
+    }
+}
+
+/// Samples of any channels as a file holds them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelsRead {
+    /// The samples, in the order of the file.
+    pub values: SampleValues,
+    /// Whether their values are 1/sr, where the file says so.
+    pub scale: Option<Scale>,
+    /// Where they came from, by name, where a note says it that was written of these samples.
+    pub provenance: BTreeMap<String, String>,
+    /// What was assumed of the file, and what in it cannot be trusted.
+    pub remarks: Vec<Remark>,
+}
+
+impl From<SampleValues> for ChannelsRead {
+    fn from(values: SampleValues) -> Self {
+        Self {
+            values,
+            scale: None,
+            provenance: BTreeMap::new(),
+            remarks: Vec::new(),
+        }
+    }
+}
+
+impl ChannelsRead {
+    /// The same as colours: one value is a grey.
+    ///
+    /// # Errors
+    /// Bands, which are no colours.
+    pub(crate) fn into_rgb(self, path: &Path) -> Result<SamplesRead, FileError> {
+        let samples = match self.values {
+            SampleValues::Rgb(samples) => samples,
+            SampleValues::Channels(samples) if samples.channels == Channels::Single => {
+                samples.of_channels([0; 3])
+            }
+            SampleValues::Channels(samples) => {
+                return Err(FileError::new(
+                    path,
+                    format_args!("has no r, g, b but {}", samples.channels),
+                    "only gonia fill and gonia query take bands: fill them, and give the dense BRDF",
+                ));
+            }
+        };
+        Ok(SamplesRead {
+            samples,
+            scale: self.scale,
+            provenance: self.provenance,
+            remarks: self.remarks,
+        })
+    }
+}
+
 /// What is known of samples beside their rows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SampleNote {
@@ -108,17 +232,20 @@ pub struct SampleNote {
     pub provenance: BTreeMap<String, String>,
 }
 
-impl From<Vec<Sample>> for SamplesRead {
-    fn from(samples: Vec<Sample>) -> Self {
-        Self {
-            samples,
-            ..Self::default()
-        }
-    }
-}
-
 /// Writes samples whole, and what is known of them.
 pub(crate) type WriteSamples = fn(&Path, &[Sample], Option<&SampleNote>) -> Result<(), FileError>;
+
+/// Writes samples of other channels than colours whole, and what is known of them.
+pub(crate) type WriteChannelSamples =
+    fn(&Path, &ChannelSamples, Option<&SampleNote>) -> Result<(), FileError>;
+
+/// How samples are written.
+pub(crate) struct SampleWriter {
+    /// Of colours.
+    pub rgb: WriteSamples,
+    /// Of other channels.
+    pub channels: WriteChannelSamples,
+}
 
 /// How samples are read and written.
 pub(crate) struct SampleFormat {
@@ -126,13 +253,13 @@ pub(crate) struct SampleFormat {
     pub read: ReadSamples,
     /// Writes a file whole, with what is known of the samples where it can hold that. Absent where the
     /// format is only read.
-    pub write: Option<WriteSamples>,
+    pub write: Option<SampleWriter>,
     /// Whether its files hold what is known of the samples.
     pub holds_notes: bool,
 }
 
 /// See [`crate::samples::read_samples`].
-pub(crate) type ReadSamples = fn(&Path) -> Result<SamplesRead, FileError>;
+pub(crate) type ReadSamples = fn(&Path) -> Result<ChannelsRead, FileError>;
 
 /// A format of another group, which `gonia import` reads and, some of them, `gonia export` writes.
 pub struct ForeignFormat {

@@ -32,6 +32,7 @@ mod encoding;
 mod error;
 mod error_exr;
 mod exr_blocks;
+mod exr_channels;
 mod exr_colours;
 mod exr_header;
 mod exr_planes;

@@ -131,10 +131,29 @@ pub(super) fn write(
     shape: &[usize],
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), FileError> {
+    write_elements(path, &format!("'{dtype}'"), shape, fill)
+}
+
+/// Writes a list of records whole; `fields` is the list of their names and types as numpy has it.
+pub(super) fn write_records(
+    path: &Path,
+    fields: &str,
+    rows: usize,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), FileError> {
+    write_elements(path, fields, &[rows], fill)
+}
+
+fn write_elements(
+    path: &Path,
+    descr: &str,
+    shape: &[usize],
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), FileError> {
     let sides: Vec<String> = shape.iter().map(usize::to_string).collect();
     let comma = if sides.len() == 1 { "," } else { "" };
     let mut header = format!(
-        "{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({}{comma}), }}",
+        "{{'descr': {descr}, 'fortran_order': False, 'shape': ({}{comma}), }}",
         sides.join(", ")
     );
     // Magic, version and length take ten bytes; the whole is a multiple of 64 and ends in a newline.

@@ -1,11 +1,11 @@
 //! An array of numpy's as samples: which of its elements is which number of which sample.
 
 use crate::FileError;
+use crate::format::SampleValues;
 use crate::npy::{NpyHeader, shape_text};
 use crate::npy_type::{ElementType, Field, NumberType};
 use crate::sample_columns::{NumberRow, SampleColumns};
 use crate::sample_rows::{BadRow, frame_of_number, sample_from_row};
-use gonia_brdf::Sample;
 use gonia_rig::Remark;
 use std::io::{self, Read};
 use std::ops::RangeInclusive;
@@ -21,8 +21,7 @@ const COLUMNS: RangeInclusive<u64> = 5..=8;
 const MOST_RESERVED: usize = 1 << 20;
 
 /// What is needed, as a remedy says it.
-const NEEDED: &str =
-    "save N × 7 of float32 (theta_i, phi_i, theta_v, phi_v, r, g, b), or N × 8 with the frame last";
+const NEEDED: &str = "save N × 7 of float32 (theta_i, phi_i, theta_v, phi_v, r, g, b), or N × 8 with the frame last; bands as records with names (450nm)";
 
 /// Where the numbers of each sample stand.
 pub(super) struct SampleArray {
@@ -189,9 +188,9 @@ impl SampleArray {
     ///
     /// # Errors
     /// The row that holds no sample, or an error of the reader.
-    pub fn read(&self, data: &mut impl Read, is_there: bool) -> Result<Vec<Sample>, RowError> {
+    pub fn read(&self, data: &mut impl Read, is_there: bool) -> Result<SampleValues, RowError> {
         let most = if is_there { usize::MAX } else { MOST_RESERVED };
-        let mut samples = Vec::with_capacity(self.rows.min(most));
+        let mut samples = self.columns.room(self.rows.min(most));
         if !self.by_rows {
             let all = self.numbers.len() * self.rows * self.element_bytes;
             let mut bytes = Vec::with_capacity(all.min(most));
@@ -213,9 +212,16 @@ impl SampleArray {
     }
 
     /// Appends the samples of so many rows that stand in `bytes`.
-    fn append(&self, bytes: &[u8], rows: usize, samples: &mut Vec<Sample>) -> Result<(), RowError> {
+    fn append(
+        &self,
+        bytes: &[u8],
+        rows: usize,
+        samples: &mut SampleValues,
+    ) -> Result<(), RowError> {
         let bad = |row: usize| move |bad| RowError::Bad { row, bad };
-        if self.is_single_by_rows() {
+        if let SampleValues::Rgb(samples) = samples
+            && self.is_single_by_rows()
+        {
             let mut row = [0f32; 8];
             let n_columns = self.numbers.len();
             for one in bytes.chunks_exact(self.step) {
@@ -231,8 +237,8 @@ impl SampleArray {
                 numbers: &self.numbers,
                 bytes: &bytes[row * self.step..],
             };
-            let sample = self.columns.sample(&mut row).map_err(bad(samples.len()))?;
-            samples.push(sample);
+            let number = samples.len();
+            self.columns.push(&mut row, samples).map_err(bad(number))?;
         }
         Ok(())
     }

@@ -1,7 +1,8 @@
 //! What is said of samples that cannot stand as their file has them.
 
-use crate::format::SamplesRead;
+use crate::format::{ChannelsRead, SampleValues};
 use crate::{FileError, samples_csv, table};
+use gonia_brdf::Sample;
 use gonia_rig::{Oddity, Remark, keep_sound};
 use std::path::Path;
 
@@ -10,12 +11,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// More than half would be left out.
-pub(crate) fn sort_out(path: &Path, read: &mut SamplesRead) -> Result<(), FileError> {
-    let azimuths_are_polar = read
-        .samples
-        .iter()
-        .all(|s| s.phi_i_deg <= 90.0 && s.phi_v_deg <= 90.0);
-    let odd = keep_sound(&mut read.samples);
+pub(crate) fn sort_out(path: &Path, read: &mut ChannelsRead) -> Result<(), FileError> {
+    let (azimuths_are_polar, odd) = match &mut read.values {
+        SampleValues::Rgb(samples) => (are_polar(samples), keep_sound(samples)),
+        SampleValues::Channels(samples) => (are_polar(&samples.places), samples.keep_sound()),
+    };
     let exchanged = odd.no_angle.count > 0 && azimuths_are_polar;
     let kinds = [
         (
@@ -62,6 +62,12 @@ pub(crate) fn sort_out(path: &Path, read: &mut SamplesRead) -> Result<(), FileEr
         ));
     }
     Ok(())
+}
+
+/// Whether all azimuths could be polar angles.
+fn are_polar<const N: usize>(samples: &[Sample<N>]) -> bool {
+    let mut samples = samples.iter();
+    samples.all(|s| s.phi_i_deg <= 90.0 && s.phi_v_deg <= 90.0)
 }
 
 fn counted(oddity: &Oddity, all: usize, what: &str) -> String {

@@ -1,15 +1,14 @@
 //! Which column of a table holds what of a sample, and the sample that a row makes.
 
 use crate::column_name::{Quantity, column_name};
-use crate::sample_rows::{BadRow, COLUMNS, sample_from_row};
-use gonia_brdf::Sample;
-use gonia_rig::Remark;
+use crate::format::SampleValues;
+use crate::sample_rows::{BadRow, COLUMNS, place_from_row, sample_from_row};
+use gonia_rig::{ChannelSamples, Channels, Remark};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 /// What is needed, as a remedy says it.
-const NEEDED: &str =
-    "name theta_i, phi_i, theta_v, phi_v (degrees, or _rad), and r, g, b or one value (brdf)";
+const NEEDED: &str = "name theta_i, phi_i, theta_v, phi_v (degrees, or _rad), and r, g, b, one value (brdf) or bands (450nm, ...)";
 
 /// A right angle in radians, rounded up to as few as three decimals, is one.
 const RIGHT_ANGLE_ROUNDED_RAD: f64 = 1.5711;
@@ -35,8 +34,9 @@ struct AngleColumn {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SampleColumns {
     angles: [AngleColumn; 4],
-    /// One column three times where there is one channel.
-    channels: [usize; 3],
+    /// What the values are of, and their columns in the channels' order.
+    channels: Channels,
+    values: Vec<usize>,
     frame: Option<usize>,
     /// Columns in radians by their names.
     in_radians: Vec<String>,
@@ -64,20 +64,13 @@ impl SampleColumns {
                 None => missing.push(COLUMNS[k]),
             }
         }
-        let mut channels = [0; 3];
-        let mut no_channel = Vec::new();
-        for (c, channel) in channels.iter_mut().enumerate() {
-            match place(Quantity::Channel(c))? {
-                Some((place, _)) => *channel = place,
-                None => no_channel.push(COLUMNS[4 + c]),
+        let (channels, values) = match value_columns(names)? {
+            ValueColumns::Of(channels, places) => (channels, places),
+            ValueColumns::Missing(colours) => {
+                missing.extend(colours);
+                Default::default()
             }
-        }
-        if !no_channel.is_empty() {
-            match place(Quantity::Value)? {
-                Some((place, _)) => channels = [place; 3],
-                None => missing.append(&mut no_channel),
-            }
-        }
+        };
         if !missing.is_empty() {
             return Err(Unclear {
                 problem: format!(
@@ -96,16 +89,17 @@ impl SampleColumns {
             frame: place(Quantity::Frame)?.map(|(place, _)| place),
             angles,
             channels,
+            values,
         })
     }
 
     /// By the number of columns alone: four angles and a value or three, and perhaps the frame.
     pub fn by_count(columns: usize) -> Option<Self> {
         let (channels, frame) = match columns {
-            5 => ([4; 3], None),
-            6 => ([4; 3], Some(5)),
-            7 => ([4, 5, 6], None),
-            8 => ([4, 5, 6], Some(7)),
+            5 => (Channels::Single, None),
+            6 => (Channels::Single, Some(5)),
+            7 => (Channels::Rgb, None),
+            8 => (Channels::Rgb, Some(7)),
             _ => return None,
         };
         Some(Self {
@@ -113,6 +107,7 @@ impl SampleColumns {
                 place,
                 radians: false,
             }),
+            values: (4..4 + channels.count()).collect(),
             channels,
             frame,
             in_radians: Vec::new(),
@@ -121,8 +116,10 @@ impl SampleColumns {
 
     /// The columns in their order, for people.
     pub fn text(&self) -> String {
-        let one = self.channels[0] == self.channels[1];
-        let values = if one { "brdf" } else { "r, g, b" };
+        let values = match self.channels {
+            Channels::Single => "brdf".to_owned(),
+            _ => self.channels.column_names().join(", "),
+        };
         let frame = if self.frame.is_some() { ", frame" } else { "" };
         format!("{}, {values}{frame}", COLUMNS[..4].join(", "))
     }
@@ -130,7 +127,7 @@ impl SampleColumns {
     /// The places that are read.
     pub fn places(&self) -> impl Iterator<Item = usize> {
         let angles = self.angles.iter().map(|angle| angle.place);
-        angles.chain(self.channels).chain(self.frame)
+        angles.chain(self.values.iter().copied()).chain(self.frame)
     }
 
     /// What is to be said of the columns as a whole.
@@ -147,30 +144,124 @@ impl SampleColumns {
         })
     }
 
-    /// The sample of a row.
-    pub fn sample(&self, row: &mut impl NumberRow) -> Result<Sample, BadRow> {
-        let mut numbers = [0f32; 7];
+    /// Room for samples of these columns.
+    pub fn room(&self, capacity: usize) -> SampleValues {
+        match &self.channels {
+            Channels::Rgb => SampleValues::Rgb(Vec::with_capacity(capacity)),
+            channels => SampleValues::Channels(ChannelSamples {
+                channels: channels.clone(),
+                places: Vec::with_capacity(capacity),
+                values: Vec::with_capacity(capacity * channels.count()),
+            }),
+        }
+    }
+
+    /// Appends the sample of a row to what [`Self::room`] made.
+    pub fn push(&self, row: &mut impl NumberRow, to: &mut SampleValues) -> Result<(), BadRow> {
+        let mut angles = [0f32; 4];
         for (k, angle) in self.angles.iter().enumerate() {
-            numbers[k] = if angle.radians {
+            angles[k] = if angle.radians {
                 degrees(row.double(angle.place)?, k)?
             } else {
                 row.single(angle.place)?
             };
         }
-        numbers[4] = row.single(self.channels[0])?;
-        for c in 1..3 {
-            numbers[4 + c] = if self.channels[c] == self.channels[0] {
-                numbers[4]
-            } else {
-                row.single(self.channels[c])?
-            };
+        let frame = |row: &mut _, unknown| match self.frame {
+            Some(place) => NumberRow::frame(row, place),
+            None => Ok(unknown),
+        };
+        match to {
+            SampleValues::Rgb(samples) => {
+                let mut numbers = [0f32; 7];
+                numbers[..4].copy_from_slice(&angles);
+                for (number, place) in numbers[4..].iter_mut().zip(&self.values) {
+                    *number = row.single(*place)?;
+                }
+                let mut sample = sample_from_row(&numbers)?;
+                sample.frame = frame(row, sample.frame)?;
+                samples.push(sample);
+            }
+            SampleValues::Channels(samples) => {
+                let first = samples.values.len();
+                for place in &self.values {
+                    samples.values.push(row.single(*place)?);
+                }
+                let mut place = place_from_row(angles, &samples.values[first..])?;
+                place.frame = frame(row, place.frame)?;
+                samples.places.push(place);
+            }
         }
-        let mut sample = sample_from_row(&numbers)?;
-        if let Some(frame) = self.frame {
-            sample.frame = row.frame(frame)?;
-        }
-        Ok(sample)
+        Ok(())
     }
+}
+
+/// Which columns hold values.
+enum ValueColumns {
+    /// The places of the channels.
+    Of(Channels, Vec<usize>),
+    /// There are none, and of the colours these are missing.
+    Missing(Vec<&'static str>),
+}
+
+/// The columns of colours, of bands, or of one value.
+fn value_columns(names: &[impl AsRef<str>]) -> Result<ValueColumns, Unclear> {
+    let text = |place: usize| names[place].as_ref().trim();
+    let mut colours = Vec::new();
+    let mut no_channel = Vec::new();
+    for c in 0..3 {
+        match nearest(names, Quantity::Channel(c))? {
+            Some((place, _)) => colours.push(place),
+            None => no_channel.push(COLUMNS[4 + c]),
+        }
+    }
+    let (mut bands, mut wavelengths) = (Vec::new(), Vec::new());
+    for (place, name) in names.iter().enumerate() {
+        if let Some(Quantity::Band(wavelength)) = column_name(name.as_ref()).map(|n| n.quantity) {
+            bands.push(place);
+            wavelengths.push(wavelength);
+        }
+    }
+    let one = nearest(names, Quantity::Value)?.map(|(place, _)| place);
+    let both = |first: usize, band: usize| Unclear {
+        problem: format!(
+            "{} and {} are columns of values of two kinds",
+            text(first),
+            text(band)
+        ),
+        remedy: "keep those of one kind: r, g, b, or bands (450nm), or one value",
+    };
+    if let Some(band) = bands.first() {
+        if let Some(other) = colours
+            .first()
+            .filter(|_| no_channel.is_empty())
+            .or(one.as_ref())
+        {
+            return Err(both(*other, *band));
+        }
+        let (channels, order) = Channels::bands(&wavelengths).map_err(|same| Unclear {
+            problem: format!("the band of {same}"),
+            remedy: "keep one of the two columns, or rename the other",
+        })?;
+        let places = order.iter().map(|k| bands[*k]).collect();
+        return Ok(ValueColumns::Of(channels, places));
+    }
+    if no_channel.is_empty() {
+        return Ok(ValueColumns::Of(Channels::Rgb, colours));
+    }
+    let Some(one) = one else {
+        return Ok(ValueColumns::Missing(no_channel));
+    };
+    let is = |place: usize, name: &str| text(place).eq_ignore_ascii_case(name);
+    let of_xyz = |place: &usize| is(*place, "x") || is(*place, "z");
+    if is(one, "y")
+        && let Some(other) = (0..names.len()).find(of_xyz)
+    {
+        return Err(Unclear {
+            problem: format!("{} stands beside {}", text(one), text(other)),
+            remedy: "give linear r, g, b in place of X, Y, Z, or Y alone",
+        });
+    }
+    Ok(ValueColumns::Of(Channels::Single, vec![one]))
 }
 
 /// The column of a quantity whose name is nearest to gonia's own, and whether it is in radians.
@@ -260,7 +351,7 @@ mod tests {
         assert_eq!(one, SampleColumns::by_count(6).unwrap());
         // All three channels count more than their mean.
         let columns = by_names("theta_i,phi_i,theta_v,phi_v,brdf,r,g,b").unwrap();
-        assert_eq!(columns.channels, [5, 6, 7]);
+        assert_eq!(columns.values, [5, 6, 7]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! its note is a file beside it, `samples.npy.toml`, which holds the checksum of the samples and is
 //! believed only of these.
 
-use crate::format::{SampleNote, SamplesRead};
+use crate::format::{ChannelsRead, SampleNote};
 use crate::{FileError, checksum, toml_text, write_whole_bytes};
 use gonia_rig::{Remark, Scale};
 use serde::{Deserialize, Serialize};
@@ -75,7 +75,7 @@ pub(super) fn write_comments(out: &mut impl Write, note: &SampleNote) -> io::Res
 ///
 /// # Errors
 /// Comments, or comments and a note, that contradict each other; an unreadable file.
-pub(super) fn add_to(read: &mut SamplesRead, samples: &Path) -> Result<(), FileError> {
+pub(super) fn add_to(read: &mut ChannelsRead, samples: &Path) -> Result<(), FileError> {
     if let Some(scale) = scale_in_comments(samples, &mut read.remarks)? {
         agree(&mut read.scale, scale, samples)?;
     }

@@ -14,7 +14,7 @@ pub(super) const LAST_FRAME: u32 = Sample::NO_FRAME - 1;
 pub(super) const LAST_FRAME_IN_SINGLE: u32 = (1 << 24) - 1;
 
 /// Whether any sample says which frame it came from.
-pub(super) fn have_frames(samples: &[Sample]) -> bool {
+pub(super) fn have_frames<const N: usize>(samples: &[Sample<N>]) -> bool {
     samples
         .iter()
         .any(|sample| sample.frame != Sample::NO_FRAME)
@@ -60,14 +60,7 @@ pub(super) struct BadRow {
 /// A row as a sample, its azimuths wrapped. `row` has 7 or 8 columns. Directions that are none and values
 /// that are not finite stay in it for [`crate::odd_samples`], which knows how many there are.
 pub(super) fn sample_from_row(row: &[f32]) -> Result<Sample, BadRow> {
-    // The sum of finite numbers is finite, save for ones far beyond every value of a BRDF.
-    let sum: f32 = row.iter().take(7).sum();
-    if !sum.is_finite() && row.iter().take(7).all(|v| v.is_finite()) {
-        return Err(BadRow {
-            problem: "its values are beyond all measure".into(),
-            remedy: "check the units: degrees, and BRDF values in 1/sr",
-        });
-    }
+    check_sum(row.iter().take(7))?;
     let frame = match row.get(7) {
         None => Sample::NO_FRAME,
         Some(frame) => frame_of_number(f64::from(*frame), LAST_FRAME_IN_SINGLE)?,
@@ -80,6 +73,31 @@ pub(super) fn sample_from_row(row: &[f32]) -> Result<Sample, BadRow> {
         rgb: [row[4], row[5], row[6]],
         frame,
     })
+}
+
+/// The directions of a sample, its azimuths wrapped, whose values are kept elsewhere; of no frame.
+pub(super) fn place_from_row(angles: [f32; 4], values: &[f32]) -> Result<Sample<0>, BadRow> {
+    check_sum(angles.iter().chain(values))?;
+    Ok(Sample {
+        theta_i_deg: angles[0],
+        phi_i_deg: wrapped(angles[1]),
+        theta_v_deg: angles[2],
+        phi_v_deg: wrapped(angles[3]),
+        rgb: [],
+        frame: Sample::NO_FRAME,
+    })
+}
+
+/// The sum of finite numbers is finite, save for ones far beyond every value of a BRDF.
+fn check_sum<'a>(numbers: impl Iterator<Item = &'a f32> + Clone) -> Result<(), BadRow> {
+    let sum: f32 = numbers.clone().sum();
+    if !sum.is_finite() && numbers.clone().all(|v| v.is_finite()) {
+        return Err(BadRow {
+            problem: "its values are beyond all measure".into(),
+            remedy: "check the units: degrees, and BRDF values in 1/sr",
+        });
+    }
+    Ok(())
 }
 
 fn wrapped(phi: f32) -> f32 {

@@ -4,20 +4,28 @@
 //! where it is unknown. What is read is wider: other names, units, separators, types and orders.
 //! Written are float32 `.npy` of N × 7 or N × 8, and `.csv` with these names in a header.
 
-pub use crate::format::{SampleNote, SamplesRead};
+pub use crate::format::{ChannelsRead, SampleNote, SampleValues, SamplesRead};
 
-use crate::format::{Content, ReadSamples, SampleFormat, WriteSamples};
+use crate::format::{Content, ReadSamples, SampleFormat, SampleWriter};
 use crate::sample_rows::LAST_FRAME;
 use crate::{FileError, odd_samples, sample_note, samples_csv, table};
 use gonia_brdf::Sample;
-use gonia_rig::Scale;
+use gonia_rig::{ChannelSamples, Scale};
 use std::path::{Path, PathBuf};
 
 /// Endings besides `.csv` under which a table of text is read, with a header or without.
 const TEXT_ENDINGS: [&str; 2] = ["txt", "tsv"];
 
-/// Reads samples; the format is recognised by the first bytes, else by the ending. Ten million from
-/// `.npy` of float32 take well below a second.
+/// Reads samples of colours; one value counts as a grey. The format is recognised by the first bytes, else by the
+/// ending. Ten million from `.npy` of float32 take well below a second.
+///
+/// # Errors
+/// As [`read_channels`], and samples of bands.
+pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
+    read_channels(path)?.into_rgb(path)
+}
+
+/// Reads samples of any channels: colours, one value, or bands.
 ///
 /// # Errors
 /// One line naming the file and, where there is one, the row (counted from 0 in arrays) or line: of no
@@ -25,7 +33,7 @@ const TEXT_ENDINGS: [&str; 2] = ["txt", "tsv"];
 /// none or that its type does not tell from the next one, or more than half of the samples below the
 /// horizon or not finite. Fewer of these are left out, negative polar angles are turned, and the
 /// remarks say how many.
-pub fn read_samples(path: &Path) -> Result<SamplesRead, FileError> {
+pub fn read_channels(path: &Path) -> Result<ChannelsRead, FileError> {
     let mut read = (reader_of(path)?)(path)?;
     odd_samples::sort_out(path, &mut read)?;
     sample_note::add_to(&mut read, path)?;
@@ -89,25 +97,37 @@ pub fn check_scale(path: &Path, scale: Option<Scale>, dense: Scale) -> Result<()
     }
 }
 
-/// Reads the samples of several sessions of one material as one: frames are numbered on, so that no
-/// two sessions share a number. `said` is their scale where the files do not say it.
+/// As [`read_channels_of_all`], of colours.
 ///
 /// # Errors
-/// As [`read_samples`] and [`one_scale`], and more frames than a file can number.
+/// As [`read_channels_of_all`], and samples of bands.
 pub fn read_samples_of_all(
     paths: &[PathBuf],
     said: Option<Scale>,
 ) -> Result<SamplesRead, FileError> {
-    let mut all = SamplesRead::default();
+    let first = paths.first().map(PathBuf::as_path);
+    read_channels_of_all(paths, said)?.into_rgb(first.unwrap_or(Path::new("")))
+}
+
+/// Reads the samples of several sessions of one material as one: frames are numbered on, so that no
+/// two sessions share a number. `said` is their scale where the files do not say it.
+///
+/// # Errors
+/// As [`read_channels`] and [`one_scale`], files of different channels, and more frames than a file can number.
+pub fn read_channels_of_all(
+    paths: &[PathBuf],
+    said: Option<Scale>,
+) -> Result<ChannelsRead, FileError> {
+    let mut all = ChannelsRead::from(SampleValues::Rgb(Vec::new()));
     let mut scales = Vec::with_capacity(paths.len());
     let mut next = 0u32;
     for (number, path) in (1..).zip(paths) {
-        let SamplesRead {
-            mut samples,
+        let ChannelsRead {
+            mut values,
             scale,
             provenance,
             mut remarks,
-        } = read_samples(path)?;
+        } = read_channels(path)?;
         let of = if paths.len() == 1 {
             String::from("samples")
         } else {
@@ -119,10 +139,10 @@ pub fn read_samples_of_all(
         all.remarks.append(&mut remarks);
         scales.push((path.as_path(), scale));
         let mut last = None;
-        for sample in &mut samples {
-            if sample.frame != Sample::NO_FRAME {
-                sample.frame = sample.frame.saturating_add(next);
-                last = last.max(Some(sample.frame));
+        for frame in values.frames_mut() {
+            if *frame != Sample::NO_FRAME {
+                *frame = frame.saturating_add(next);
+                last = last.max(Some(*frame));
             }
         }
         if let Some(last) = last {
@@ -135,10 +155,19 @@ pub fn read_samples_of_all(
             }
             next = last + 1;
         }
-        if all.samples.is_empty() {
-            all.samples = samples;
-        } else {
-            all.samples.append(&mut samples);
+        if number == 1 {
+            all.values = values;
+        } else if !all.values.append(&mut values) {
+            return Err(FileError::new(
+                path,
+                format_args!(
+                    "has the channels {}, but {} has {}",
+                    values.channels(),
+                    paths[0].display(),
+                    all.values.channels()
+                ),
+                "give files of the same channels together",
+            ));
         }
     }
     all.scale = one_scale(&scales, said)?;
@@ -151,7 +180,7 @@ pub fn read_samples_of_all(
 /// # Errors
 /// Another ending, or the file cannot be written.
 pub fn write_samples(path: &Path, samples: &[Sample]) -> Result<(), FileError> {
-    (writer_of(path)?.0)(path, samples, None)?;
+    (writer_of(path)?.0.rgb)(path, samples, None)?;
     sample_note::write_beside(path, None)
 }
 
@@ -166,7 +195,21 @@ pub fn write_noted_samples(
     note: &SampleNote,
 ) -> Result<(), FileError> {
     let (write, holds_notes) = writer_of(path)?;
-    write(path, samples, Some(note))?;
+    (write.rgb)(path, samples, Some(note))?;
+    sample_note::write_beside(path, (!holds_notes).then_some(note))
+}
+
+/// As [`write_noted_samples`], of other channels than colours.
+///
+/// # Errors
+/// As [`write_samples`].
+pub fn write_noted_channels(
+    path: &Path,
+    samples: &ChannelSamples,
+    note: &SampleNote,
+) -> Result<(), FileError> {
+    let (write, holds_notes) = writer_of(path)?;
+    (write.channels)(path, samples, Some(note))?;
     sample_note::write_beside(path, (!holds_notes).then_some(note))
 }
 
@@ -211,13 +254,13 @@ fn is_text(path: &Path) -> bool {
 }
 
 /// The writer by the name's ending, and whether its files hold notes.
-fn writer_of(path: &Path) -> Result<(WriteSamples, bool), FileError> {
+fn writer_of(path: &Path) -> Result<(&'static SampleWriter, bool), FileError> {
     match table::format_of_name(path).map(|format| &format.content) {
         Some(Content::Samples(SampleFormat {
             write: Some(write),
             holds_notes,
             ..
-        })) => Ok((*write, *holds_notes)),
+        })) => Ok((write, *holds_notes)),
         _ => Err(unknown(path, is_written)),
     }
 }
@@ -234,6 +277,116 @@ fn unknown(path: &Path, endings: fn(&Content) -> bool) -> FileError {
 mod tests {
     use super::*;
     use crate::sample_rows::tests::some_samples;
+    use gonia_rig::Channels;
+
+    fn bands_of(text: &str) -> Result<ChannelsRead, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("s.csv");
+        std::fs::write(&path, text).unwrap();
+        read_channels(&path).map_err(|error| {
+            assert_eq!(error.to_string().lines().count(), 1);
+            error.to_string()
+        })
+    }
+
+    fn some_bands() -> ChannelSamples {
+        let read = bands_of(
+            "1000nm,theta_i,phi_i,theta_v,phi_v,380nm,frame,note\n0.3,10,20,30,40,0.1,7,a\n0.4,11,21,31,41,0.2,,b\n",
+        );
+        match read.unwrap().values {
+            SampleValues::Channels(samples) => samples,
+            SampleValues::Rgb(_) => panic!("no colours"),
+        }
+    }
+
+    #[test]
+    fn bands_come_by_wavelength_and_go_to_files_and_back_with_their_names() {
+        let samples = some_bands();
+        assert_eq!(samples.channels.names(), ["380nm", "1000nm"]);
+        assert_eq!(samples.values, [0.1, 0.3, 0.2, 0.4]);
+        let places = samples.places.iter().map(|s| (s.phi_v_deg, s.frame));
+        let places: Vec<_> = places.collect();
+        assert_eq!(places, [(40.0, 7), (41.0, Sample::NO_FRAME)]);
+        let dir = tempfile::tempdir().unwrap();
+        let note = SampleNote {
+            scale: Some(Scale::Absolute),
+            ..SampleNote::default()
+        };
+        for name in ["s.csv", "s.npy"] {
+            let path = dir.path().join(name);
+            write_noted_channels(&path, &samples, &note).unwrap();
+            let read = read_channels(&path).unwrap();
+            let same = SampleValues::Channels(samples.clone());
+            assert_eq!((read.values, read.scale), (same, Some(Scale::Absolute)));
+            let error = read_samples(&path).unwrap_err().to_string();
+            assert!(
+                error.contains("has no r, g, b but 380nm, 1000nm"),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn one_value_stays_one_channel_and_is_a_grey_only_where_colours_are_wanted() {
+        for name in ["brdf", "Y", "value"] {
+            let text = format!("theta_i,phi_i,theta_v,phi_v,{name}\n10,20,30,40,0.5\n");
+            let read = bands_of(&text).unwrap();
+            assert_eq!(read.values.channels(), &Channels::Single);
+            let grey = read.into_rgb(Path::new("s.csv")).unwrap();
+            assert_eq!(grey.samples[0].rgb, [0.5; 3]);
+        }
+    }
+
+    #[test]
+    fn columns_of_two_kinds_and_files_of_different_channels_are_refused_in_a_line() {
+        let table = |values: &str| {
+            let row = vec!["1"; 4 + values.split(',').count()].join(",");
+            format!("theta_i,phi_i,theta_v,phi_v,{values}\n{row}\n")
+        };
+        for (values, said) in [
+            (
+                "r,g,b,450nm",
+                "r and 450nm are columns of values of two kinds",
+            ),
+            (
+                "450nm,brdf",
+                "brdf and 450nm are columns of values of two kinds",
+            ),
+            ("450nm,brdf_450nm", "450 nm is there twice"),
+            ("X,Y,Z", "Y stands beside X"),
+            ("r,g", "there is no column for b"),
+        ] {
+            let error = bands_of(&table(values)).unwrap_err();
+            assert!(error.contains(said), "{error}");
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str, values: &str| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, table(values)).unwrap();
+            path
+        };
+        let bands = file("a.csv", "450nm,550nm");
+        let others = file("b.csv", "450nm,560nm");
+        let colours = file("c.csv", "r,g,b");
+        for (first, second, said) in [
+            (&bands, &others, "has the channels 450nm, 560nm, but"),
+            (&bands, &colours, "has the channels R, G, B, but"),
+            (
+                &colours,
+                &bands,
+                "a.csv: has the channels 450nm, 550nm, but",
+            ),
+        ] {
+            let both = [first.clone(), second.clone()];
+            let error = read_channels_of_all(&both, None).unwrap_err().to_string();
+            assert!(
+                error.contains(said) && error.lines().count() == 1,
+                "{error}"
+            );
+        }
+        let twice = read_channels_of_all(&[bands.clone(), bands], None).unwrap();
+        assert_eq!(twice.values.len(), 2);
+    }
 
     #[test]
     fn samples_come_back_from_either_kind_of_file() {

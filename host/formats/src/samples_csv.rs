@@ -1,6 +1,6 @@
 //! Samples as `.csv`, and as other tables of text.
 
-use crate::format::{Content, Format, SampleFormat, SampleNote, SamplesRead};
+use crate::format::{ChannelsRead, Content, Format, SampleFormat, SampleNote, SampleWriter};
 use crate::sample_columns::{NumberRow, SampleColumns};
 use crate::sample_note::write_comments;
 use crate::sample_rows::{
@@ -10,7 +10,7 @@ use crate::text_file::{read_first_lines, read_text};
 use crate::text_table::{Rows, TextTable};
 use crate::{FileError, write_whole};
 use gonia_brdf::Sample;
-use gonia_rig::Remark;
+use gonia_rig::{ChannelSamples, Channels, Remark};
 use std::io::Write;
 use std::path::Path;
 use std::str::FromStr;
@@ -25,7 +25,10 @@ pub(super) static FORMAT: Format = Format {
     magic: &[],
     content: Content::Samples(SampleFormat {
         read,
-        write: Some(write),
+        write: Some(SampleWriter {
+            rgb: write,
+            channels: write_channels,
+        }),
         holds_notes: true,
     }),
 };
@@ -49,17 +52,18 @@ pub(super) fn table(path: &Path) -> Result<TextTable, FileError> {
 }
 
 /// Reads samples from a table of text.
-pub(super) fn read(path: &Path) -> Result<SamplesRead, FileError> {
+pub(super) fn read(path: &Path) -> Result<ChannelsRead, FileError> {
     let table = table(path)?;
     let (columns, assumed) = columns_of(path, &table)?;
     let mut rows = table.rows();
-    let mut samples = Vec::new();
+    let mut samples = columns.room(0);
     while rows.advance()? {
-        let sample = columns.sample(&mut Numbers {
+        let mut row = Numbers {
             rows: &mut rows,
             table: &table,
-        });
-        samples.push(sample.map_err(|bad| match &assumed {
+        };
+        let pushed = columns.push(&mut row, &mut samples);
+        pushed.map_err(|bad| match &assumed {
             None => table.wrong(rows.line(), bad.problem, bad.remedy),
             Some(_) => table.wrong(
                 rows.line(),
@@ -70,7 +74,7 @@ pub(super) fn read(path: &Path) -> Result<SamplesRead, FileError> {
                 ),
                 format_args!("{}, or name the columns in the first line", bad.remedy),
             ),
-        })?);
+        })?;
     }
     if samples.is_empty() {
         return Err(FileError::new(
@@ -87,10 +91,9 @@ pub(super) fn read(path: &Path) -> Result<SamplesRead, FileError> {
         ));
     }
     let remarks = columns.remark(path).into_iter().chain(assumed).collect();
-    Ok(SamplesRead {
-        samples,
+    Ok(ChannelsRead {
         remarks,
-        ..SamplesRead::default()
+        ..samples.into()
     })
 }
 
@@ -167,20 +170,44 @@ impl NumberRow for Numbers<'_, '_> {
 }
 
 fn write(path: &Path, samples: &[Sample], note: Option<&SampleNote>) -> Result<(), FileError> {
-    let with_frames = have_frames(samples);
-    let columns = if with_frames { 8 } else { 7 };
+    let values = samples.iter().map(|s| &s.rgb[..]);
+    write_rows(path, &Channels::Rgb, samples, values, note)
+}
+
+fn write_channels(
+    path: &Path,
+    samples: &ChannelSamples,
+    note: Option<&SampleNote>,
+) -> Result<(), FileError> {
+    let values = samples.values.chunks_exact(samples.channels.count());
+    write_rows(path, &samples.channels, &samples.places, values, note)
+}
+
+/// Writes places, and the values of each.
+fn write_rows<'a, const N: usize>(
+    path: &Path,
+    channels: &Channels,
+    places: &[Sample<N>],
+    values: impl Iterator<Item = &'a [f32]>,
+    note: Option<&SampleNote>,
+) -> Result<(), FileError> {
+    let with_frames = have_frames(places);
     write_whole(path, |out| {
         if let Some(note) = note {
             write_comments(out, note)?;
         }
-        writeln!(out, "{}", COLUMNS[..columns].join(","))?;
-        for s in samples {
-            let [r, g, b] = s.rgb;
+        let names = channels.column_names().join(",");
+        let frame = if with_frames { ",frame" } else { "" };
+        writeln!(out, "{},{names}{frame}", COLUMNS[..4].join(","))?;
+        for (s, values) in places.iter().zip(values) {
             write!(
                 out,
-                "{},{},{},{},{r},{g},{b}",
+                "{},{},{},{}",
                 s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg
             )?;
+            for value in values {
+                write!(out, ",{value}")?;
+            }
             if with_frames {
                 write!(out, ",{}", frame_in_file(s.frame))?;
             }

@@ -1,30 +1,35 @@
 //! Samples as `.npy`.
 
 use crate::FileError;
-use crate::format::{Content, Format, SampleFormat, SampleNote, SamplesRead};
+use crate::format::{ChannelsRead, Content, Format, SampleFormat, SampleNote, SampleWriter};
 use crate::npy::{self, NpyFile};
 use crate::npy_samples::{RowError, SampleArray};
-use crate::sample_rows::{LAST_FRAME_IN_SINGLE, frame_in_file, have_frames};
+use crate::sample_rows::{COLUMNS, LAST_FRAME_IN_SINGLE, frame_in_file, have_frames};
 use gonia_brdf::Sample;
+use gonia_rig::ChannelSamples;
 use std::io::Write;
 use std::path::Path;
 
 /// Rows written at a time.
 const ROWS: usize = 1 << 13;
 
-/// NumPy's array file. Written: float32, N × 7 or N × 8, in C order.
+/// NumPy's array file. Written: float32, N × 7 or N × 8, in C order; other channels than colours as records, whose
+/// fields have the channels' names.
 pub(super) static FORMAT: Format = Format {
     name: "NumPy",
     endings: &["npy"],
     magic: b"\x93NUMPY",
     content: Content::Samples(SampleFormat {
         read,
-        write: Some(write),
+        write: Some(SampleWriter {
+            rgb: write,
+            channels: write_channels,
+        }),
         holds_notes: false,
     }),
 };
 
-fn read(path: &Path) -> Result<SamplesRead, FileError> {
+fn read(path: &Path) -> Result<ChannelsRead, FileError> {
     let NpyFile {
         header,
         len,
@@ -40,10 +45,9 @@ fn read(path: &Path) -> Result<SamplesRead, FileError> {
         }
         RowError::Io(error) => FileError::reading(path, &error),
     })?;
-    Ok(SamplesRead {
-        samples,
+    Ok(ChannelsRead {
         remarks: array.remarks(path),
-        ..SamplesRead::default()
+        ..samples.into()
     })
 }
 
@@ -86,6 +90,49 @@ fn write(path: &Path, samples: &[Sample], _: Option<&SampleNote>) -> Result<(), 
         }
         Ok(())
     })
+}
+
+/// Records of float32, the frame an int64.
+fn write_channels(
+    path: &Path,
+    samples: &ChannelSamples,
+    _: Option<&SampleNote>,
+) -> Result<(), FileError> {
+    let with_frames = have_frames(&samples.places);
+    let names = COLUMNS[..4].iter().copied().map(str::to_owned);
+    let names = names.chain(samples.channels.names());
+    let mut fields: Vec<String> = names.map(|name| format!("('{name}', '<f4')")).collect();
+    if with_frames {
+        fields.push("('frame', '<i8')".into());
+    }
+    let rows = samples.places.iter();
+    let values = samples.values.chunks_exact(samples.channels.count());
+    npy::write_records(
+        path,
+        &format!("[{}]", fields.join(", ")),
+        samples.places.len(),
+        |out| {
+            let mut buffer = Vec::new();
+            for (place, values) in rows.zip(values) {
+                buffer.clear();
+                let angles = [
+                    place.theta_i_deg,
+                    place.phi_i_deg,
+                    place.theta_v_deg,
+                    place.phi_v_deg,
+                ];
+                for value in angles.iter().chain(values) {
+                    buffer.extend_from_slice(&value.to_le_bytes());
+                }
+                if with_frames {
+                    let frame = frame_in_file(place.frame) as i64;
+                    buffer.extend_from_slice(&frame.to_le_bytes());
+                }
+                out.write_all(&buffer)?;
+            }
+            Ok(())
+        },
+    )
 }
 
 #[cfg(test)]

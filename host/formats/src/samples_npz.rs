@@ -1,7 +1,7 @@
 //! Samples as an array in an `.npz`, numpy's archive of arrays.
 
 use crate::FileError;
-use crate::format::{Content, Format, SampleFormat, SamplesRead};
+use crate::format::{ChannelsRead, Content, Format, SampleFormat, SampleValues};
 use crate::npy::{self, NpyHeader};
 use crate::npy_samples::{NotSamples, RowError, SampleArray};
 use gonia_rig::Remark;
@@ -36,7 +36,7 @@ struct Member {
     array: Result<SampleArray, NotSamples>,
 }
 
-fn read(path: &Path) -> Result<SamplesRead, FileError> {
+fn read(path: &Path) -> Result<ChannelsRead, FileError> {
     let file = File::open(path).map_err(|error| FileError::reading(path, &error))?;
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|e| wrong_zip(path, e))?;
     let mut members = Vec::new();
@@ -58,10 +58,9 @@ fn read(path: &Path) -> Result<SamplesRead, FileError> {
     let array = array.map_err(|not| not.of(path))?;
     remarks.extend(array.remarks(path));
     let samples = samples_of(path, &mut archive, index, &name, &array)?;
-    Ok(SamplesRead {
-        samples,
+    Ok(ChannelsRead {
         remarks,
-        ..SamplesRead::default()
+        ..samples.into()
     })
 }
 
@@ -125,7 +124,7 @@ fn samples_of(
     index: usize,
     name: &str,
     array: &SampleArray,
-) -> Result<Vec<gonia_brdf::Sample>, FileError> {
+) -> Result<SampleValues, FileError> {
     let mut file = archive.by_index(index).map_err(|e| wrong_zip(path, e))?;
     let size = file.size();
     let damaged = |error: io::Error| match error.kind() {
@@ -200,7 +199,7 @@ mod tests {
         bytes.into_inner()
     }
 
-    fn read_bytes(bytes: &[u8]) -> Result<SamplesRead, String> {
+    fn read_bytes(bytes: &[u8]) -> Result<crate::samples::SamplesRead, String> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("s.npz");
         std::fs::write(&path, bytes).unwrap();

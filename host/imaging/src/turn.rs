@@ -3,6 +3,7 @@
 
 use gonia_rig::Frame;
 use std::fmt;
+use std::ops::Sub;
 
 /// How a frame was turned or mirrored after it was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,19 +47,25 @@ impl Turn {
         let mut rgb = Vec::with_capacity(frame.rgb.len());
         for y in 0..height {
             rgb.extend((0..width).map(|x| {
-                let [column, row] = match self {
-                    Self::Half => [right - x, bottom - y],
-                    Self::Right => [right - y, x],
-                    Self::Left => [y, bottom - x],
-                    Self::Mirrored => [right - x, y],
-                    Self::Flipped => [x, bottom - y],
-                    Self::Transposed => [y, x],
-                    Self::Transverse => [right - y, bottom - x],
-                };
+                let [column, row] = self.seen_at([x, y], [right, bottom]);
                 frame.rgb[row * width + column]
             }));
         }
         Some(Frame { width, height, rgb })
+    }
+
+    /// Where a turned frame shows what was at a pixel of it as it was taken; `last` is the largest column and row.
+    pub fn seen_at<T: Copy + Sub<Output = T>>(self, [x, y]: [T; 2], last: [T; 2]) -> [T; 2] {
+        let [right, bottom] = last;
+        match self {
+            Self::Half => [right - x, bottom - y],
+            Self::Right => [right - y, x],
+            Self::Left => [y, bottom - x],
+            Self::Mirrored => [right - x, y],
+            Self::Flipped => [x, bottom - y],
+            Self::Transposed => [y, x],
+            Self::Transverse => [right - y, bottom - x],
+        }
     }
 }
 

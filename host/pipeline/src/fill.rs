@@ -7,12 +7,12 @@ use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines::{self, BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{
     self, AnyKernel, ByRows, Calibration, Data, ErrorBars, FillError, FillSettings,
-    IsotropicOrigins, Kernel, Matern32, OriginCounts, Preset,
+    IsotropicOrigins, Kernel, Matern32, NewBlock, OriginCounts, Preset,
 };
 use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit, is_few};
 use gonia_brdf::{Bin, Bins, DenseBrdf, Direction, Grid, Sample, Symmetry, SymmetryKind};
-use gonia_formats::dense::write_dense_by_rows;
-use gonia_rig::{DenseFile, Remark, SampleSet, keep_sound};
+use gonia_formats::dense::{RowsNote, write_dense_by_rows};
+use gonia_rig::{Channels, DenseFile, Remark, SampleSet, keep_sound};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -80,7 +80,7 @@ impl FromStr for FillMethod {
 }
 
 /// A grid of more cells than this (12 bytes each) is filled row by row, in twice the time.
-const CELLS_IN_MEMORY: usize = 150_000_000;
+pub(crate) const CELLS_IN_MEMORY: usize = 150_000_000;
 
 impl FillOptions {
     /// The default with another step.
@@ -360,10 +360,14 @@ pub fn fill_to_file(
     provenance.insert("symmetry".into(), binned.symmetry.clone());
     provenance.extend(facts.clone());
     let sums = AlbedoRows::new(grid);
-    let seen = |light: usize, row: [&[f32]; 3]| sums.add(light, row);
+    let seen = |light: usize, row: &[&[f32]]| sums.add(light, first_three(row));
+    let note = RowsNote {
+        channels: &Channels::Rgb,
+        scale,
+        provenance: &provenance,
+    };
     step(progress, Step::InterpolatingAndWriting, |share| {
-        write_dense_by_rows(path, grid, &rows, scale, &provenance, &seen, share)
-            .map_err(Error::from)
+        write_dense_by_rows(path, grid, &rows, &note, &seen, share).map_err(Error::from)
     })?;
     let albedo = sums.finish(binned.highest_deg());
     let counts = binned.counts();
@@ -378,13 +382,18 @@ pub fn fill_to_file(
     })
 }
 
+/// The first three channels of a row; of fewer the rest has no values.
+pub(crate) fn first_three<'a>(row: &[&'a [f32]]) -> [&'a [f32]; 3] {
+    [0, 1, 2].map(|c| row.get(c).copied().unwrap_or_default())
+}
+
 /// Bins, interpolated block by block.
 #[derive(Clone, Debug)]
-pub struct FilledBins {
+pub struct FilledBins<const N: usize = 3> {
     /// The values.
-    pub dense: DenseBrdf,
+    pub dense: DenseBrdf<N>,
     /// Standard errors, where asked for.
-    pub errors: Option<ErrorBars>,
+    pub errors: Option<ErrorBars<N>>,
     /// The settings, as chosen for the material.
     pub settings: FillSettings,
 }
@@ -399,8 +408,34 @@ pub fn fill_bins(
     with_errors: bool,
     progress: &Progress<'_>,
 ) -> Result<FilledBins, Error> {
+    fill_bins_of(bins, Start::Choose(base), with_errors, progress)
+}
+
+/// What the settings of a fill come from.
+#[derive(Clone, Copy)]
+pub(crate) enum Start {
+    /// The material's own, from these.
+    Choose(FillSettings),
+    /// As they were chosen for other channels of the same samples.
+    Chosen(FillSettings),
+}
+
+/// [`fill_bins`] of any number of channels that has blocks.
+pub(crate) fn fill_bins_of<const N: usize>(
+    bins: &Bins<N>,
+    start: Start,
+    with_errors: bool,
+    progress: &Progress<'_>,
+) -> Result<FilledBins<N>, Error>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
+    let (Start::Choose(base) | Start::Chosen(base)) = start;
     let known = sorted(bins, base, progress)?;
-    let settings = chosen(&known, base, progress)?;
+    let settings = match start {
+        Start::Choose(base) => chosen(&known, base, progress)?,
+        Start::Chosen(settings) => settings,
+    };
     let (dense, errors) = if with_errors {
         let calibration = step(progress, Step::CalibratingErrorBars, |_| {
             Calibration::new(&known, &settings).ok_or(Error::TooFewFrames)
@@ -423,42 +458,47 @@ pub fn fill_bins(
     })
 }
 
-fn sorted<'a>(
-    bins: &'a Bins,
+pub(crate) fn sorted<'a, const N: usize>(
+    bins: &'a Bins<N>,
     base: FillSettings,
     progress: &Progress<'_>,
-) -> Result<Data<'a>, Error> {
+) -> Result<Data<'a, N>, Error> {
     step(progress, Step::Sorting, |_| {
         Ok(Data::thinned(bins, base.one_bin_in))
     })
 }
 
-fn chosen(
-    known: &Data<'_>,
+pub(crate) fn chosen<const N: usize>(
+    known: &Data<'_, N>,
     base: FillSettings,
     progress: &Progress<'_>,
-) -> Result<FillSettings, Error> {
+) -> Result<FillSettings, Error>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     step(progress, Step::ChoosingSettings, |_| {
         Ok(interpolate::select(known, base).settings)
     })
 }
 
 /// Samples in their bins, and what is to be said of them.
-struct Binned {
-    bins: Bins,
+pub(crate) struct Binned {
+    pub bins: Bins,
     samples: usize,
     /// How many of a sample are in the bins: with its images.
     images: usize,
     /// The fit of few samples, or of those of an isotropic material: it takes the place of the bins.
-    fit: Option<ScatteredFit>,
-    /// The symmetry, for people and for the provenance.
-    symmetry: String,
-    origins: OriginCounts,
-    remarks: Vec<Remark>,
+    pub fit: Option<ScatteredFit>,
+    /// The symmetry, for people and for the provenance …
+    pub symmetry: String,
+    /// … and the images that the bins hold.
+    pub completed_by: Symmetry,
+    pub origins: OriginCounts,
+    pub remarks: Vec<Remark>,
 }
 
 impl Binned {
-    fn new(
+    pub fn new(
         mut samples: SampleSet,
         grid: Grid,
         options: &FillOptions,
@@ -513,6 +553,7 @@ impl Binned {
             images,
             fit,
             symmetry: format!("{symmetry}, {reason}"),
+            completed_by: symmetry,
             origins,
             remarks,
         };
@@ -522,7 +563,7 @@ impl Binned {
     }
 
     /// The largest polar angle of light, or by reciprocity of view, that was measured.
-    fn highest_deg(&self) -> f64 {
+    pub fn highest_deg(&self) -> f64 {
         let grid = self.bins.grid();
         let ring = |bin: &Bin| {
             let (light, view) = grid.light_and_view(bin.cell as usize);
@@ -532,7 +573,7 @@ impl Binned {
         highest as f64 * grid.step_deg()
     }
 
-    fn counts(&self) -> FillCounts {
+    pub fn counts(&self) -> FillCounts {
         let in_bins: usize = self.bins.bins().iter().map(|bin| bin.count as usize).sum();
         let binned = in_bins / self.images;
         FillCounts {
@@ -546,13 +587,13 @@ impl Binned {
 }
 
 /// Where the cells of a fit have their values from.
-enum Origins<'a> {
+pub(crate) enum Origins<'a> {
     Isotropic(IsotropicOrigins),
     Anisotropic(&'a Bins),
 }
 
 impl<'a> Origins<'a> {
-    fn of(bins: &'a Bins, fit: &ScatteredFit) -> Self {
+    pub fn of(bins: &'a Bins, fit: &ScatteredFit) -> Self {
         match fit.choice().settings.symmetry {
             Symmetry::Isotropic => Origins::Isotropic(IsotropicOrigins::of(bins, true)),
             Symmetry::Turns => Origins::Isotropic(IsotropicOrigins::of(bins, false)),
@@ -567,7 +608,7 @@ impl<'a> Origins<'a> {
         }
     }
 
-    fn of_cells(&self) -> Vec<u8> {
+    pub fn of_cells(&self) -> Vec<u8> {
         match self {
             Origins::Isotropic(origins) => origins.of_cells(),
             Origins::Anisotropic(bins) => interpolate::origins(bins),
@@ -651,7 +692,7 @@ pub fn fit_of_samples(
 
 /// Of many samples of an isotropic material, the medians of those that share a cell when all are turned to
 /// one azimuth of light.
-fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
+pub(crate) fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
     let turned = samples.iter().map(|s| Sample {
         phi_i_deg: 0.0,
         phi_v_deg: (s.phi_v_deg - s.phi_i_deg).rem_euclid(360.0),
@@ -667,7 +708,7 @@ fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
 }
 
 /// What a filled BRDF says of its making.
-fn provenance_of(settings: &str) -> Provenance {
+pub(crate) fn provenance_of(settings: &str) -> Provenance {
     let mut facts = of_this_program();
     facts.insert("interpolation".into(), settings.to_owned());
     facts

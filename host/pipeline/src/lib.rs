@@ -32,11 +32,14 @@ pub mod bracket;
 mod bracket_sensor;
 pub mod calibrate;
 pub mod chart;
+mod colours;
 pub mod compare;
+mod compare_bands;
 mod doubts;
 mod error;
 pub mod export;
 mod fill;
+mod fill_channels;
 pub mod fit;
 pub mod process;
 mod progress;
@@ -44,12 +47,17 @@ pub mod provenance;
 mod samples;
 
 pub use calibrate::{CalibrateError, Calibrated, calibrate};
+pub use colours::colours_of;
 pub use compare::{CompareError, Options, Side, Table, compare};
+pub use compare_bands::{BandFigures, compare_bands};
 pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
     FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins,
     fill_to_file, fit_of_samples,
+};
+pub use fill_channels::{
+    ChannelFits, FilledChannels, fill_channels, fill_channels_to_file, fits_of_channels,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

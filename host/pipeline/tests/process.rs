@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use gonia_brdf::Elementary;
+use gonia_brdf::direction::angle_between;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction, Pose, Sample};
 use gonia_formats::FileError;
@@ -631,41 +632,65 @@ fn a_camera_that_is_off_in_all_frames_is_said_to_be_in_one_line() {
     }
 }
 
+/// Median angle between directions of the light of two rigs at the frames' poses, degrees.
+fn light_apart_deg(source: &Rendered, [a, b]: [&Rig; 2]) -> f64 {
+    let apart = |row: &FrameRow| {
+        let [a, b] = [a, b].map(|rig| rig.light_at(row.pose.light).direction_from([0.0; 2]));
+        angle_between(a, b).to_degrees()
+    };
+    let mut all: Vec<f64> = source.rows().iter().map(apart).collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
+}
+
 #[test]
-fn a_light_that_is_off_shows_in_the_shading_of_a_known_reference() {
+fn a_light_that_is_off_shows_in_the_shading_of_a_known_reference_and_by_how_much() {
     type Change = fn(&mut Rig);
-    let shading = "its shading is not";
-    let off: [(&str, Change, &str); 3] = [
-        (
-            "6 mm beside and 1 % too far",
-            |rig| {
-                rig.light.arm.right_mm = 6.0;
-                rig.light.distance_m *= 1.01;
-            },
-            shading,
-        ),
-        (
-            "zeros 0.3 degrees off",
-            |rig| {
-                rig.light.arm.theta_zero_deg = 0.3;
-                rig.light.arm.phi_zero_deg = -0.3;
-            },
-            shading,
-        ),
-        // The lines show that first: few frames have them in their places.
-        (
-            "target 4 mm high",
-            |rig| rig.target.place.height_mm = 4.0,
-            "the rig is not what it says",
-        ),
+    let off: [(&str, usize, Change); 4] = [
+        ("3 mm beside and 1 % too far", 240, |rig| {
+            rig.light.arm.right_mm = 3.0;
+            rig.light.distance_m *= 1.01;
+        }),
+        ("zeros 0.3 degrees off", 240, |rig| {
+            rig.light.arm.theta_zero_deg = 0.3;
+            rig.light.arm.phi_zero_deg = -0.3;
+        }),
+        ("zero of theta 0.12 degrees off", 320, |rig| {
+            rig.light.arm.theta_zero_deg = 0.12;
+        }),
+        ("target 1 mm high and tilted by 0.2 degrees", 320, |rig| {
+            rig.target.place.height_mm = 1.0;
+            rig.target.place.tilt_deg = [0.2, 0.0];
+        }),
     ];
     let mut wrong = Vec::new();
-    for (what, change, word) in off {
-        let (source, rig) = crooked(240, 60, change);
+    for (what, px, change) in off {
+        let (source, rig) = crooked(px, 40, change);
+        let mut truth = rig.clone();
+        change(&mut truth);
+        let is = light_apart_deg(&source, [&rig, &truth]);
         let said = said(&source, &rig);
-        wrong.extend((!said.contains(word)).then(|| format!("{what}: {said}")));
+        let numbers = said
+            .split_once("are off by ")
+            .and_then(|(_, rest)| rest.split_once(" degrees in the median frame"))
+            .and_then(|(numbers, _)| numbers.split_once(" ± "));
+        let is_right = numbers.is_some_and(|(deg, u)| {
+            let [deg, u]: [f64; 2] = [deg, u].map(|text| text.parse().unwrap());
+            u < 0.05 && (deg - is).abs() < 0.02 + 2.0 * u
+        });
+        wrong.extend((!is_right).then(|| format!("{what}: {is:.3} {said}")));
     }
+    // The lines show that first: few frames have them in their places.
+    let (source, rig) = crooked(240, 40, |rig| rig.target.place.height_mm = 4.0);
+    let said = said(&source, &rig);
+    wrong.extend((!said.contains("the rig is not what it says")).then_some(said));
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_rig_as_it_is_said_to_be_is_left_in_peace_by_small_frames_too() {
+    let (source, rig) = crooked(160, 60, |_| {});
+    assert_eq!(said(&source, &rig), "");
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod light;
 mod picture;
 pub mod png;
 mod shade;
+mod spectrum;
 mod sphere;
 pub mod svg;
 mod tabulated;
@@ -23,6 +24,7 @@ pub use environment::Environment;
 pub use gonia_brdf::model::shading::Light;
 pub use light::{from_above, single, studio};
 pub use picture::Picture;
+pub use spectrum::SpectrumColours;
 pub use sphere::sphere;
 pub use tabulated::Tabulated;
 

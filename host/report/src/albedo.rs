@@ -24,7 +24,7 @@ pub fn section(brdf: &DenseBrdf, scale: Scale) -> Markup {
                 (chart(&albedo))
                 figcaption {
                     "∫ f cos θv dωv" (relative) ", mean over azimuths; highest "
-                    (format!("{:.3}", albedo.highest)) " (" (albedo.channel_name()) " at θi "
+                    (format!("{:.3}", albedo.highest)) " (" (albedo.channel_name) " at θi "
                     (format!("{:.0}°, φi {:.0}°", albedo.theta_i_deg, albedo.phi_i_deg))
                     "). Beyond the grid's last angle its values count on to the horizon"
                 }

@@ -10,6 +10,7 @@
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
+//! | [`Channels`], [`ChannelSamples`], [`DenseChannels`] | colours, one value, or the bands of a spectrum; samples and a dense BRDF of these |
 //! | [`keep_sound`], [`Oddities`] | samples that cannot stand as they came |
 //! | [`Remark`] | what is said of data that were used all the same |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
@@ -19,8 +20,11 @@ mod bench_setup;
 mod calibration;
 mod camera_model;
 mod cell_mask;
+mod channel_samples;
+mod channels;
 mod check;
 mod dense;
+mod dense_channels;
 mod figures;
 mod frame;
 mod frame_row;
@@ -43,8 +47,11 @@ pub use bench_setup::{ArmPorts, DEFAULT_BAUD, SessionSettings, Source, Thermomet
 pub use calibration::Calibration;
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
+pub use channel_samples::ChannelSamples;
+pub use channels::{Channels, SameBand};
 pub use check::{check_rig, rig_remarks};
 pub use dense::DenseFile;
+pub use dense_channels::DenseChannels;
 pub use figures::{Figures, StratumFigures};
 pub use frame::Frame;
 pub use frame_row::{Exposure, FrameRow, Role};

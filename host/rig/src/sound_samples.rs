@@ -45,7 +45,7 @@ impl Oddities {
 
 /// Turns negative polar angles to the other side of the normal, and leaves out what has no direction above
 /// the sample or no value. Samples that are sound stay as they are, in their order.
-pub fn keep_sound(samples: &mut Vec<Sample>) -> Oddities {
+pub fn keep_sound<const N: usize>(samples: &mut Vec<Sample<N>>) -> Oddities {
     let mut odd = Oddities {
         samples: samples.len(),
         ..Oddities::default()
@@ -66,25 +66,25 @@ pub fn keep_sound(samples: &mut Vec<Sample>) -> Oddities {
 
 const POLAR_ANGLES: std::ops::RangeInclusive<f32> = 0.0..=90.0;
 
-fn is_sound(s: &Sample) -> bool {
-    let numbers = [s.phi_i_deg, s.phi_v_deg, s.rgb[0], s.rgb[1], s.rgb[2]];
+fn is_sound<const N: usize>(s: &Sample<N>) -> bool {
+    let azimuths = [s.phi_i_deg, s.phi_v_deg];
     POLAR_ANGLES.contains(&s.theta_i_deg)
         && POLAR_ANGLES.contains(&s.theta_v_deg)
-        && numbers.iter().all(|v| v.is_finite())
+        && azimuths.iter().chain(&s.rgb).all(|v| v.is_finite())
 }
 
-fn sound(mut s: Sample, number: usize, odd: &mut Oddities) -> Option<Sample> {
+fn sound<const N: usize>(mut s: Sample<N>, number: usize, odd: &mut Oddities) -> Option<Sample<N>> {
     let numbers = [
         ("theta_i", s.theta_i_deg),
         ("phi_i", s.phi_i_deg),
         ("theta_v", s.theta_v_deg),
         ("phi_v", s.phi_v_deg),
-        ("r", s.rgb[0]),
-        ("g", s.rgb[1]),
-        ("b", s.rgb[2]),
     ];
-    if let Some((name, value)) = numbers.iter().find(|(_, v)| !v.is_finite()) {
-        odd.not_finite.note(number, name, *value);
+    let channel = |c: usize| if N == 3 { ["r", "g", "b"][c] } else { "value" };
+    let values = s.rgb.iter().enumerate().map(|(c, v)| (channel(c), *v));
+    let all = numbers.into_iter().chain(values);
+    if let Some((name, value)) = all.into_iter().find(|(_, v)| !v.is_finite()) {
+        odd.not_finite.note(number, name, value);
         return None;
     }
     let polar = [numbers[0], numbers[2]];

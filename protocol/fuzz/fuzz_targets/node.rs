@@ -3,7 +3,7 @@
 #![no_main]
 
 use gonia_firmware::controller::ArmController;
-use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::steps::{End, Period, StepProgress};
 use gonia_protocol::NODE_LIGHT;
@@ -30,7 +30,7 @@ impl Hardware for Pins {
         }
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis, _: u32) -> Result<u32, EncoderLost> {
+    fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
         match self.sensors & 3 {
             0 => Err(EncoderLost),
             1 => Ok(u32::MAX),
@@ -40,6 +40,11 @@ impl Hardware for Pins {
     fn home_switch_closed(&mut self, _: Axis) -> bool {
         self.sensors & 4 != 0
     }
+    fn alarm_closed(&mut self, _: Axis) -> bool {
+        self.sensors & 8 != 0
+    }
+    fn switch_drivers(&mut self, _: bool) {}
+    fn release_brakes(&mut self, _: bool) {}
     fn interlock_closed(&mut self) -> bool {
         self.sensors & 0x38 != 0x38
     }

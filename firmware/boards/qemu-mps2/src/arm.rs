@@ -1,6 +1,6 @@
 //! The arm: real step timers in front of the simulator's motors, its encoders and switches behind.
 
-use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
+use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::settings::Axis;
 use gonia_sim::arm::SimulatedArm;
@@ -33,12 +33,24 @@ impl Hardware for EmulatedArm {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost> {
-        self.0.encoder_counts(axis, turn)
+    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost> {
+        self.0.encoder_counts(axis, setup)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
         self.0.home_switch_closed(axis)
+    }
+
+    fn alarm_closed(&mut self, axis: Axis) -> bool {
+        self.0.alarm_closed(axis)
+    }
+
+    fn switch_drivers(&mut self, on: bool) {
+        self.0.switch_drivers(on);
+    }
+
+    fn release_brakes(&mut self, released: bool) {
+        self.0.release_brakes(released);
     }
 
     fn interlock_closed(&mut self) -> bool {

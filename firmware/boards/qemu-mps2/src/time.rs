@@ -6,6 +6,7 @@ use core::task::Waker;
 use critical_section::Mutex;
 use embassy_time_driver::Driver;
 use embassy_time_queue_utils::Queue;
+use gonia_firmware::clock::{WideCounter, next_alarm};
 
 use crate::register::Register;
 
@@ -23,8 +24,7 @@ const CLOCK_MHZ: u64 = 25;
 const LONGEST_US: u64 = 60_000_000;
 
 struct State {
-    high: u64,
-    last: u32,
+    counter: WideCounter,
     queue: Queue,
 }
 
@@ -33,28 +33,20 @@ struct BoardClock {
 }
 
 embassy_time_driver::time_driver_impl!(static CLOCK: BoardClock = BoardClock {
-    state: Mutex::new(RefCell::new(State { high: 0, last: 0, queue: Queue::new() })),
+    state: Mutex::new(RefCell::new(State { counter: WideCounter::new(), queue: Queue::new() })),
 });
 
 impl State {
     fn now(&mut self) -> u64 {
-        let low = COUNTER.read();
-        if low < self.last {
-            self.high += 1 << 32;
-        }
-        self.last = low;
-        self.high + u64::from(low)
+        self.counter.now(COUNTER.read())
     }
 
     /// Sets the alarm to the next expiry.
     fn set_alarm(&mut self) {
-        let mut now = self.now();
-        let mut next = self.queue.next_expiration(now);
-        // What expires meanwhile is woken at once.
-        while next <= now {
-            now = self.now();
-            next = self.queue.next_expiration(now);
-        }
+        let (now, next) = next_alarm(
+            || self.counter.now(COUNTER.read()),
+            |by| self.queue.next_expiration(by),
+        );
         let wait = (next - now).min(LONGEST_US) * CLOCK_MHZ;
         TIMER_CTRL.write(0);
         TIMER_INTCLEAR.write(1);

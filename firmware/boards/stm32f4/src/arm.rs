@@ -1,24 +1,24 @@
 //! Everything that one arm's controller is wired to.
 
 use embassy_stm32::gpio::Input;
-use embassy_stm32::mode::Blocking;
-use embassy_stm32::spi::Spi;
-use embassy_stm32::spi::mode::Master;
-use gonia_firmware::hardware::{EncoderLost, Hardware, NotSaved};
-use gonia_firmware::ssi::SsiEncoder;
+use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::spi_encoder::SpiEncoder;
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
+use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
 use crate::{alive, now_us, pulses, steps};
 
 /// Pins, encoders and memory; the drivers are with the step timers. Pairs are θ and φ.
 pub struct ArmPins {
     /// The shafts.
-    pub encoders: [SsiEncoder<Spi<'static, Blocking, Master>>; 2],
+    pub encoders: [SpiEncoder<EncoderSpi>; 2],
     /// To ground when closed.
     pub home_switches: [Input<'static>; 2],
+    /// To ground when closed, where the board has them.
+    pub alarms: Option<[Input<'static>; 2]>,
     /// To ground while the chain is closed, so that a cut wire stops the arm.
     pub interlock: Input<'static>,
     /// Settings.
@@ -53,12 +53,25 @@ impl Hardware for ArmPins {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis, turn: u32) -> Result<u32, EncoderLost> {
-        self.encoders[axis.index()].counts(now_us(), turn)
+    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost> {
+        self.encoders[axis.index()].counts(now_us(), setup)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
         self.home_switches[axis.index()].is_low()
+    }
+
+    fn alarm_closed(&mut self, axis: Axis) -> bool {
+        let alarms = self.alarms.as_ref();
+        alarms.is_some_and(|alarms| alarms[axis.index()].is_low())
+    }
+
+    fn switch_drivers(&mut self, on: bool) {
+        alive::switch_drivers(on);
+    }
+
+    fn release_brakes(&mut self, released: bool) {
+        alive::release_brakes(released);
     }
 
     fn interlock_closed(&mut self) -> bool {

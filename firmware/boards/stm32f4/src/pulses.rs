@@ -1,12 +1,14 @@
-//! The trigger wire: pulses out by TIM3's channel 2, and the edges of the other arm's captured by its channel
-//! 3, both in the microseconds that the board's clock counts.
+//! The trigger wire: pulses out by one of TIM3's channels, and the edges of the other arm's captured by another,
+//! both in the microseconds that the board's clock counts.
 //!
 //! The timer raises and lowers the output; the interrupt only sets the count at which. A pulse longer than TIM3
 //! counts is timed in parts.
 
 use core::cell::RefCell;
+use core::sync::atomic::{AtomicUsize, Ordering};
 
 use critical_section::Mutex;
+use embassy_stm32::gpio::{AfType, Pull};
 use embassy_stm32::interrupt::typelevel::{Interrupt, TIM3 as IRQ};
 use embassy_stm32::interrupt::{self, Priority};
 use embassy_stm32::pac::TIM3;
@@ -14,13 +16,21 @@ use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue, Ocm};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
+use gonia_pins::signals::Signal;
+use gonia_pins::{Board, CLOCK_TIMER};
 use gonia_protocol::message::MAX_PULSES;
 
+use crate::gpio::{DRIVEN, give};
 use crate::{now_us, time};
 
-/// Channel 2 gives pulses, channel 3 captures edges; counted from 0.
-const OUT: usize = 1;
-const IN: usize = 2;
+/// The channels that give pulses and capture edges, counted from 0.
+static OUT: AtomicUsize = AtomicUsize::new(1);
+static IN: AtomicUsize = AtomicUsize::new(2);
+
+fn out_channel() -> usize {
+    OUT.load(Ordering::Relaxed)
+}
+
 /// A pulse begins so long after its request, µs: the registers are written by then.
 const LEAD_US: u64 = 8;
 /// The rest of a pulse is timed in one part up to this, µs; a longer one in parts of the second constant.
@@ -48,20 +58,30 @@ enum Pulse {
 
 static PULSE: Mutex<RefCell<Pulse>> = Mutex::new(RefCell::new(Pulse::None));
 
-/// Gives TIM3's channels their work; its pins are given to it already.
-pub fn start() {
-    TIM3.ccmr_output(OUT / 2)
-        .modify(|w| w.set_ocm(OUT % 2, Ocm::FORCE_INACTIVE));
-    TIM3.ccmr_input(IN / 2).modify(|w| {
-        w.set_ccs(IN % 2, CcmrInputCcs::TI4);
+/// Gives TIM3's channels their pins and their work.
+pub fn start(of: &Board) {
+    let (out, into) = (of.trigger_out, of.trigger_in);
+    let (out_channel, in_channel) = (usize::from(out.channel) - 1, usize::from(into.channel) - 1);
+    OUT.store(out_channel, Ordering::Relaxed);
+    IN.store(in_channel, Ordering::Relaxed);
+    set_mode(Ocm::FORCE_INACTIVE);
+    give(out.wire, Signal::Timer(CLOCK_TIMER, out.channel), DRIVEN);
+    let pulled_down = AfType::input(Pull::Down);
+    give(
+        into.wire,
+        Signal::Timer(CLOCK_TIMER, into.channel),
+        pulled_down,
+    );
+    TIM3.ccmr_input(in_channel / 2).modify(|w| {
+        w.set_ccs(in_channel % 2, CcmrInputCcs::TI4);
         // 8 equal samples at 84 MHz: a spike of 90 ns is none.
-        w.set_icf(IN % 2, FilterValue::FCK_INT_N8);
+        w.set_icf(in_channel % 2, FilterValue::FCK_INT_N8);
     });
     TIM3.ccer().modify(|w| {
-        w.set_cce(OUT, true);
-        w.set_cce(IN, true);
+        w.set_cce(out_channel, true);
+        w.set_cce(in_channel, true);
     });
-    TIM3.dier().modify(|w| w.set_ccie(IN, true));
+    TIM3.dier().modify(|w| w.set_ccie(in_channel, true));
     IRQ::set_priority(Priority::P1);
     // SAFETY: the handler shares data with the main loop through critical sections only.
     unsafe { IRQ::enable() };
@@ -72,10 +92,11 @@ pub fn begin(length_us: u32) -> u64 {
     critical_section::with(|cs| {
         let begins_us = now_us() + LEAD_US;
         let ends_us = begins_us + u64::from(length_us);
-        TIM3.ccr(OUT).write(|w| w.set_ccr(begins_us as u16));
+        TIM3.ccr(out_channel())
+            .write(|w| w.set_ccr(begins_us as u16));
         set_mode(Ocm::ACTIVE_ON_MATCH);
-        clear(OUT);
-        TIM3.dier().modify(|w| w.set_ccie(OUT, true));
+        clear(out_channel());
+        TIM3.dier().modify(|w| w.set_ccie(out_channel(), true));
         PULSE.replace(cs, Pulse::Rising { ends_us });
         begins_us
     })
@@ -92,12 +113,12 @@ pub fn end() {
 /// The output is low, whatever state the rest is in.
 pub fn off() {
     set_mode(Ocm::FORCE_INACTIVE);
-    TIM3.dier().modify(|w| w.set_ccie(OUT, false));
+    TIM3.dier().modify(|w| w.set_ccie(out_channel(), false));
 }
 
 fn set_mode(mode: Ocm) {
-    TIM3.ccmr_output(OUT / 2)
-        .modify(|w| w.set_ocm(OUT % 2, mode));
+    TIM3.ccmr_output(out_channel() / 2)
+        .modify(|w| w.set_ocm(out_channel() % 2, mode));
 }
 
 /// Flags are cleared by writing 0; 1 leaves the others alone.
@@ -112,7 +133,7 @@ fn on_match() {
         *pulse = match *pulse {
             Pulse::Rising { ends_us } | Pulse::High { ends_us } => go_on(ends_us),
             Pulse::Falling | Pulse::None => {
-                TIM3.dier().modify(|w| w.set_ccie(OUT, false));
+                TIM3.dier().modify(|w| w.set_ccie(out_channel(), false));
                 Pulse::None
             }
         };
@@ -125,12 +146,12 @@ fn go_on(ends_us: u64) -> Pulse {
     if left_us > LONGEST_US {
         set_mode(Ocm::FORCE_ACTIVE);
         let next_us = ends_us - left_us + PART_US;
-        TIM3.ccr(OUT).write(|w| w.set_ccr(next_us as u16));
+        TIM3.ccr(out_channel()).write(|w| w.set_ccr(next_us as u16));
         return Pulse::High { ends_us };
     }
-    TIM3.ccr(OUT).write(|w| w.set_ccr(ends_us as u16));
+    TIM3.ccr(out_channel()).write(|w| w.set_ccr(ends_us as u16));
     set_mode(Ocm::INACTIVE_ON_MATCH);
-    if now_us() >= ends_us && !TIM3.sr().read().ccif(OUT) {
+    if now_us() >= ends_us && !TIM3.sr().read().ccif(out_channel()) {
         // Shorter than this interrupt took.
         off();
         return Pulse::None;
@@ -141,13 +162,13 @@ fn go_on(ends_us: u64) -> Pulse {
 #[embassy_stm32::interrupt]
 fn TIM3() {
     let flags = TIM3.sr().read();
-    if flags.ccif(OUT) {
-        clear(OUT);
+    if flags.ccif(out_channel()) {
+        clear(out_channel());
         on_match();
     }
-    if flags.ccif(IN) {
+    if flags.ccif(IN.load(Ordering::Relaxed)) {
         // Reading it clears its flag.
-        let captured = TIM3.ccr(IN).read().ccr();
+        let captured = TIM3.ccr(IN.load(Ordering::Relaxed)).read().ccr();
         let now = now_us();
         let since = (now as u16).wrapping_sub(captured);
         // Nobody waits for more edges than a train has.

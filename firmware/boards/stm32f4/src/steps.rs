@@ -1,14 +1,18 @@
-//! The step timers: TIM5 gives θ's pulses, TIM2 φ's, both of 32 bits at 84 MHz.
+//! The step timers: TIM5 times θ's steps, TIM2 φ's, both of 32 bits at 84 MHz.
 //!
-//! PWM mode 1: a period begins with a pulse of fixed width, or with none where the compare value is 0.
-//! Reload and compare values are preloaded, so that edges come at their time as long as the interrupt
-//! of a period runs before the period is over. Both count only while TIM8 runs (`alive`): a timer whose
+//! Where the step pin is a channel of its timer: PWM mode 1, a period begins with a pulse of fixed width, or with
+//! none where the compare value is 0. Reload and compare values are preloaded, so that edges come at their time as
+//! long as the interrupt of a period runs before the period is over.
+//!
+//! Where no timer reaches the pin, the interrupt at the period's end raises it first of all, and lowers it last:
+//! an edge is late by what other interrupts and critical sections take, microseconds, and there is none without
+//! the processor.
+//! Both timers count only while TIM8 runs (`alive`): a timer whose
 //! interrupt no longer comes would repeat its last period for ever.
 
 use core::cell::RefCell;
 
 use critical_section::Mutex;
-use embassy_stm32::gpio::Output;
 use embassy_stm32::interrupt::typelevel::{Interrupt, TIM2, TIM5};
 use embassy_stm32::interrupt::{self, Priority};
 use embassy_stm32::pac;
@@ -16,42 +20,66 @@ use embassy_stm32::pac::timer::vals::{Ocm, Sms, Ts, Urs};
 use embassy_stm32::peripherals;
 use embassy_stm32::rcc;
 use gonia_firmware::steps::{Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
+use gonia_pins::signals::Signal;
+use gonia_pins::{Axis as AxisPins, Level, STEP_TIMERS, StepEdge};
 use gonia_protocol::settings::Axis;
+
+use crate::gpio::{DRIVEN, Line, give, output};
 
 /// What optocoupled drivers need between edges: 2.5 µs.
 const PULSE_CLOCKS: u32 = 210;
 /// No period is shorter: a pulse, and as long again without. 200,000 steps/s.
 const SHORTEST_CLOCKS: u32 = 2 * PULSE_CLOCKS;
+/// Cycles of the processor that a pulse of an interrupt lasts at least: 0.5 µs, where drivers in sockets ask for
+/// 0.1 µs.
+const RAISED_CYCLES: u32 = 84;
 
 type Channel = Mutex<RefCell<Option<StepChannel<PulseTimer>>>>;
 
 /// θ and φ.
 static CHANNELS: [Channel; 2] = [const { Mutex::new(RefCell::new(None)) }; 2];
 
-/// A timer, which of its internal triggers TIM8 is, its compare channel, and the direction pin of the driver.
+/// What makes the edges.
+enum Edge {
+    /// This compare channel, counted from 0.
+    Compare(usize),
+    /// The interrupt, where the period that has ended is to end with one.
+    Raised { line: Line, is_due: bool },
+}
+
+/// A timer, which of its internal triggers TIM8 is, what makes its edges, and the direction pin of the driver.
 pub struct PulseTimer {
     registers: pac::timer::TimGp32,
     gate: Ts,
-    compare: usize,
-    direction: Output<'static>,
+    edge: Edge,
+    direction: Line,
 }
 
-/// Starts both timers, at rest. Their step pins are given to them already.
-pub fn start(directions: [Output<'static>; 2]) {
+/// Starts both timers, at rest.
+pub fn start(axes: &[AxisPins; 2]) {
     rcc::enable_and_reset::<peripherals::TIM5>();
     rcc::enable_and_reset::<peripherals::TIM2>();
-    let timers = [(pac::TIM5, Ts::ITR3, 0), (pac::TIM2, Ts::ITR1, 2)];
-    for ((channel, (registers, gate, compare)), direction) in
-        CHANNELS.iter().zip(timers).zip(directions)
-    {
+    let timers = [(pac::TIM5, Ts::ITR3), (pac::TIM2, Ts::ITR1)];
+    for (i, (pins, (registers, gate))) in axes.iter().zip(timers).enumerate() {
+        let edge = match pins.edge {
+            StepEdge::Timer(channel) => {
+                let signal = Signal::Timer(STEP_TIMERS[i], channel);
+                give(pins.step, signal, DRIVEN);
+                Edge::Compare(usize::from(channel) - 1)
+            }
+            StepEdge::Interrupt => Edge::Raised {
+                line: output(pins.step, Level::Low),
+                is_due: false,
+            },
+        };
         let mut timer = PulseTimer {
             registers,
             gate,
-            compare,
-            direction,
+            edge,
+            direction: output(pins.direction, Level::Low),
         };
         timer.start();
-        critical_section::with(|cs| channel.replace(cs, Some(StepChannel::new(timer))));
+        critical_section::with(|cs| CHANNELS[i].replace(cs, Some(StepChannel::new(timer))));
     }
     TIM5::set_priority(Priority::P0);
     TIM2::set_priority(Priority::P0);
@@ -79,9 +107,7 @@ pub fn progress(axis: Axis) -> StepProgress {
 pub fn halt(axis: Axis) {
     with_channel(axis, |channel| {
         // A pulse whose interrupt is still to come counts.
-        if channel.timer().take_update() {
-            channel.period_ended();
-        }
+        end_period(channel);
         channel.halt();
     });
 }
@@ -94,11 +120,21 @@ fn with_channel<R>(axis: Axis, work: impl FnOnce(&mut StepChannel<PulseTimer>) -
 }
 
 fn on_update(axis: Axis) {
-    with_channel(axis, |channel| {
-        if channel.timer().take_update() {
-            channel.period_ended();
-        }
-    });
+    with_channel(axis, end_period);
+}
+
+/// If a period has ended: its edge, where the timer does not make it, and what comes next.
+#[inline]
+fn end_period(channel: &mut StepChannel<PulseTimer>) {
+    if !channel.timer().take_update() {
+        return;
+    }
+    let raised = channel.timer().raise();
+    channel.period_ended();
+    if let Some(line) = raised {
+        cortex_m::asm::delay(RAISED_CYCLES);
+        line.set(Level::Low);
+    }
 }
 
 #[embassy_stm32::interrupt]
@@ -113,7 +149,7 @@ fn TIM2() {
 
 impl PulseTimer {
     fn start(&mut self) {
-        let (registers, compare) = (self.registers, self.compare);
+        let registers = self.registers;
         registers.cr1().write(|w| {
             w.set_arpe(true);
             w.set_urs(Urs::COUNTER_ONLY);
@@ -122,14 +158,28 @@ impl PulseTimer {
             w.set_ts(self.gate);
             w.set_sms(Sms::GATED_MODE);
         });
-        registers.ccmr_output(compare / 2).modify(|w| {
-            w.set_ocm(compare % 2, Ocm::PWM_MODE1);
-            w.set_ocpe(compare % 2, true);
-        });
-        registers.ccer().modify(|w| w.set_cce(compare, true));
+        if let Edge::Compare(compare) = self.edge {
+            registers.ccmr_output(compare / 2).modify(|w| {
+                w.set_ocm(compare % 2, Ocm::PWM_MODE1);
+                w.set_ocpe(compare % 2, true);
+            });
+            registers.ccer().modify(|w| w.set_cce(compare, true));
+        }
         self.restart(REST_TICKS);
         registers.dier().write(|w| w.set_uie(true));
         registers.cr1().modify(|w| w.set_cen(true));
+    }
+
+    /// Raises the step pin, if that is due and the timer does not do it.
+    #[inline]
+    fn raise(&mut self) -> Option<Line> {
+        match self.edge {
+            Edge::Raised { line, is_due: true } => {
+                line.set(Level::High);
+                Some(line)
+            }
+            _ => None,
+        }
     }
 
     /// Whether a period has ended since the last call.
@@ -146,8 +196,13 @@ impl PulseTimer {
 impl StepTimer for PulseTimer {
     #[inline]
     fn end_with_pulse(&mut self, pulse: bool) {
-        let width = if pulse { PULSE_CLOCKS } else { 0 };
-        self.registers.ccr(self.compare).write_value(width);
+        match &mut self.edge {
+            Edge::Compare(compare) => {
+                let width = if pulse { PULSE_CLOCKS } else { 0 };
+                self.registers.ccr(*compare).write_value(width);
+            }
+            Edge::Raised { is_due, .. } => *is_due = pulse,
+        }
     }
 
     #[inline]
@@ -166,6 +221,7 @@ impl StepTimer for PulseTimer {
 
     #[inline]
     fn set_direction(&mut self, up: bool) {
-        self.direction.set_level(up.into());
+        self.direction
+            .set(if up { Level::High } else { Level::Low });
     }
 }

@@ -13,6 +13,7 @@ use embassy_stm32::pac::{TIM3, TIM4};
 use embassy_stm32::{peripherals, rcc};
 use embassy_time_driver::Driver;
 use embassy_time_queue_utils::Queue;
+use gonia_firmware::clock::{WideCounter, next_alarm};
 
 /// 84 MHz to 1 MHz.
 const PRESCALER: u16 = 84;
@@ -24,8 +25,7 @@ const LONGEST_US: u64 = 50_000;
 const NEAREST_US: u64 = 3;
 
 struct State {
-    high: u64,
-    last: u32,
+    counter: WideCounter,
     queue: Queue,
 }
 
@@ -34,28 +34,20 @@ struct BoardClock {
 }
 
 embassy_time_driver::time_driver_impl!(static CLOCK: BoardClock = BoardClock {
-    state: Mutex::new(RefCell::new(State { high: 0, last: 0, queue: Queue::new() })),
+    state: Mutex::new(RefCell::new(State { counter: WideCounter::new(), queue: Queue::new() })),
 });
 
 impl State {
-    /// Called every 50 ms at least, where 71 minutes would do.
     fn now(&mut self) -> u64 {
-        let low = counted();
-        if low < self.last {
-            self.high += 1 << 32;
-        }
-        self.last = low;
-        self.high + u64::from(low)
+        self.counter.now(counted())
     }
 
+    /// Rings every 50 ms at least, where the counter would allow 71 minutes.
     fn set_alarm(&mut self) {
-        let mut now = self.now();
-        let mut next = self.queue.next_expiration(now);
-        // What expires meanwhile is woken at once.
-        while next <= now {
-            now = self.now();
-            next = self.queue.next_expiration(now);
-        }
+        let (now, next) = next_alarm(
+            || self.counter.now(counted()),
+            |by| self.queue.next_expiration(by),
+        );
         let wait = (next - now).clamp(NEAREST_US, LONGEST_US);
         TIM3.ccr(ALARM).write(|w| w.set_ccr((now + wait) as u16));
     }

@@ -23,6 +23,7 @@ use heapless::Deque;
 use crate::axis::AxisDrive;
 use crate::hardware::Hardware;
 use crate::homing::Homing;
+use crate::power::{Power, PowerDemand};
 use crate::settings::ControllerSettings;
 use crate::settling::SettlingMonitor;
 use crate::train::TriggerTrain;
@@ -32,6 +33,9 @@ pub const BUSY_TICK_US: u64 = 2_000;
 /// Control ticks at rest, µs.
 pub const REST_TICK_US: u64 = 20_000;
 const LOG_LEN: usize = 16;
+
+/// Looks in a row that make an alarm of what may be interference.
+const ALARM_LOOKS: u8 = 3;
 
 /// Two axes, their states, and the request under way.
 #[derive(Debug)]
@@ -48,6 +52,9 @@ pub struct ArmController {
     job: Option<u16>,
     stopping: bool,
     train: Option<TriggerTrain>,
+    power: Power,
+    /// Looks in a row at which the driver's alarm was there.
+    alarms: [u8; 2],
     last: Option<(u16, RequestOutcome)>,
     host_watchdog_until_us: u64,
     next_tick_us: u64,
@@ -55,6 +62,15 @@ pub struct ArmController {
     event_seq: u32,
     events: Deque<Message, 16>,
     log: Deque<LogEntry, LOG_LEN>,
+}
+
+/// Whether the driver of an axis reports an alarm.
+fn has_alarm(axis: Axis, settings: &ControllerSettings, hardware: &mut impl Hardware) -> bool {
+    match settings.get(axis, Key::DriverAlarm) {
+        0 => false,
+        1 => !hardware.alarm_closed(axis),
+        _ => hardware.alarm_closed(axis),
+    }
 }
 
 /// The answer to a request.
@@ -81,6 +97,8 @@ impl ArmController {
             job: None,
             stopping: false,
             train: None,
+            power: Power::default(),
+            alarms: [0; 2],
             last: None,
             host_watchdog_until_us: 0,
             next_tick_us: now_us,
@@ -187,6 +205,10 @@ impl ArmController {
         if !hardware.interlock_closed() && self.state != ControllerState::EStop {
             self.emergency_stop(now_us, hardware);
         }
+        if let Some(axis) = self.axis_with_alarm(hardware) {
+            self.fault_unless_latched(now_us, FaultCode::DRIVER_ALARM, Some(axis), hardware);
+        }
+        self.tick_power(now_us, hardware);
         for drive in &mut self.drives {
             let axis = drive.axis();
             if let Err(code) = drive.read(now_us, &self.settings, hardware) {
@@ -204,9 +226,38 @@ impl ArmController {
             ControllerState::Moving | ControllerState::Settling => {
                 self.tick_motion(now_us, hardware)
             }
+            // It may still be slowing down.
+            ControllerState::Fault(_) => {
+                self.check_following(now_us, hardware);
+            }
             _ => {}
         }
         self.send_telemetry(now_us);
+    }
+
+    fn tick_power(&mut self, now_us: u64, hardware: &mut impl Hardware) {
+        let demand = match self.state {
+            // What opens the chain may take the drivers' supply.
+            ControllerState::EStop => PowerDemand::Brake,
+            // Many a driver forgets its alarm when it is switched off.
+            ControllerState::Fault(FaultCode::DRIVER_ALARM) => PowerDemand::Off,
+            _ => PowerDemand::Run,
+        };
+        let brake_us = self.settings.get_u64(Axis::Theta, Key::BrakeTime);
+        self.power.tick(now_us, demand, brake_us, hardware);
+    }
+
+    /// The first axis whose driver has reported an alarm for a while.
+    fn axis_with_alarm(&mut self, hardware: &mut impl Hardware) -> Option<Axis> {
+        Axis::BOTH.into_iter().find(|&axis| {
+            let looks = &mut self.alarms[axis.index()];
+            *looks = if has_alarm(axis, &self.settings, hardware) {
+                looks.saturating_add(1)
+            } else {
+                0
+            };
+            *looks >= ALARM_LOOKS
+        })
     }
 
     // ---- transitions ----
@@ -246,7 +297,8 @@ impl ArmController {
         if matches!(
             self.state,
             ControllerState::Fault(_) | ControllerState::EStop
-        ) {
+        ) && !self.is_moving()
+        {
             return;
         }
         hardware.end_pulse();

@@ -8,18 +8,32 @@ use super::ArmController;
 use crate::axis::AxisDrive;
 use crate::hardware::Hardware;
 use crate::homing::Homing;
+use crate::settings::ControllerSettings;
 use crate::settling::{SettlingLimits, SettlingMonitor, SettlingResult};
+
+/// What the home switch of an axis says, whichever way its contact works.
+pub(super) fn is_at_home(
+    axis: Axis,
+    settings: &ControllerSettings,
+    hardware: &mut impl Hardware,
+) -> bool {
+    let opens_at_home = settings.get(axis, Key::HomeNormallyClosed) != 0;
+    hardware.home_switch_closed(axis) != opens_at_home
+}
 
 impl ArmController {
     pub(super) fn tick_homing(&mut self, now_us: u64, hardware: &mut impl Hardware) {
-        if !self.check_following(now_us, hardware) || self.finish_stop(now_us) {
+        if !self.check_following(now_us, hardware)
+            || self.finish_stop(now_us)
+            || !self.power.is_ready(now_us)
+        {
             return;
         }
         for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
             let Some(homing) = homing else { continue };
             let axis = drive.axis();
-            let closed = hardware.home_switch_closed(axis);
-            if let Err(code) = homing.tick(now_us, closed, drive, &self.settings, hardware) {
+            let at_home = is_at_home(axis, &self.settings, hardware);
+            if let Err(code) = homing.tick(now_us, at_home, drive, &self.settings, hardware) {
                 self.fault_unless_latched(now_us, code, Some(axis), hardware);
                 return;
             }
@@ -109,7 +123,8 @@ impl ArmController {
         }
     }
 
-    fn check_following(&mut self, now_us: u64, hardware: &mut impl Hardware) -> bool {
+    /// Whether every axis that moves follows its steps; a fault where one does not.
+    pub(super) fn check_following(&mut self, now_us: u64, hardware: &mut impl Hardware) -> bool {
         for i in 0..2 {
             let drive = &mut self.drives[i];
             if drive.is_moving() && !drive.is_following(&self.settings) {

@@ -7,7 +7,8 @@ use gonia_protocol::message::{
 };
 use gonia_protocol::settings::{Axis, Key};
 
-use super::{Answer, ArmController};
+use super::motion::is_at_home;
+use super::{Answer, ArmController, has_alarm};
 use crate::axis::AxisDrive;
 use crate::hardware::Hardware;
 use crate::homing::Homing;
@@ -81,6 +82,14 @@ impl ArmController {
         if self.drives.iter().any(AxisDrive::is_moving) {
             return Err(RequestRefusal::State(self.state));
         }
+        let is_latched = matches!(
+            self.state,
+            ControllerState::EStop | ControllerState::Fault(_)
+        );
+        let mut axes = Axis::BOTH.into_iter();
+        if is_latched && axes.any(|axis| has_alarm(axis, &self.settings, hardware)) {
+            return Err(RequestRefusal::CauseRemains(FaultCode::DRIVER_ALARM));
+        }
         match self.state {
             ControllerState::EStop => {
                 hardware.hold_interlock_open(false);
@@ -90,8 +99,8 @@ impl ArmController {
             }
             ControllerState::Fault(code) => {
                 let lost = Axis::BOTH.iter().any(|&axis| {
-                    let turn = self.settings.get_u64(axis, Key::EncoderCountsPerTurn);
-                    hardware.encoder_counts(axis, turn as u32).is_err()
+                    let setup = self.settings.encoder(axis);
+                    hardware.encoder_counts(axis, setup).is_err()
                 });
                 if lost {
                     return Err(RequestRefusal::CauseRemains(code));
@@ -123,8 +132,8 @@ impl ArmController {
         for (drive, homing) in self.drives.iter_mut().zip(&mut self.homing) {
             drive.clear_following();
             drive.forget_home();
-            let closed = hardware.home_switch_closed(drive.axis());
-            *homing = Some(Homing::begin(closed));
+            let at_home = is_at_home(drive.axis(), &self.settings, hardware);
+            *homing = Some(Homing::begin(at_home));
         }
         self.job = Some(request);
         self.enter(ControllerState::Homing, now_us);
@@ -241,6 +250,7 @@ impl ArmController {
                 | Key::HomeAngle
                 | Key::MotorReversed
                 | Key::EncoderReversed
+                | Key::EncoderKind
         ) || Key::ERROR_MAP.contains(&key)
             || Key::GEAR_MAP.contains(&key)
         {

@@ -1,5 +1,6 @@
 //! What is tried, row by row. Each starts a chip of its own.
 
+mod edges;
 mod motion;
 mod registers;
 mod safety;
@@ -20,8 +21,19 @@ pub struct Row {
     pub name: &'static str,
     /// Runs it: a figure to print, or why it failed.
     pub run: fn(&Path) -> Result<Outcome>,
-    /// Part of every test run; the others only with `--all`.
-    pub is_essential: bool,
+    /// When it is run without being asked for.
+    pub when: When,
+}
+
+/// Which boards a row is run for without being asked for; `--all` runs every row for every board.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    /// Every one: it depends on pins, flash layout or what makes the steps.
+    EveryBoard,
+    /// The first: what it shows is the same on all.
+    OneBoard,
+    /// None.
+    Asked,
 }
 
 /// What a row has measured.
@@ -34,43 +46,89 @@ pub struct Outcome {
 
 /// Every row.
 pub const ROWS: &[Row] = &[
-    row("boot and hello", true, boot),
+    row("boot and hello", When::EveryBoard, boot),
     row(
         "registers by the manual",
-        true,
+        When::EveryBoard,
         registers::as_the_manual_says,
     ),
-    row("homing, 3 poses, trigger pulses", true, motion::three_poses),
+    row(
+        "homing, 3 poses, trigger pulses",
+        When::EveryBoard,
+        motion::three_poses,
+    ),
     row(
         "processor stopped in mid-move",
-        true,
+        When::EveryBoard,
         safety::processor_stops,
     ),
-    row("hard fault in mid-move", true, safety::hard_fault),
-    row("reset in mid-move", true, safety::reset_in_mid_move),
-    row("emergency stop and clear", true, safety::emergency_stop),
-    row("settings saved, read after reset", true, settings::saved),
-    row("settings that nothing can do", true, settings::refused),
+    row(
+        "hard fault in mid-move",
+        When::EveryBoard,
+        safety::hard_fault,
+    ),
+    row(
+        "reset in mid-move",
+        When::EveryBoard,
+        safety::reset_in_mid_move,
+    ),
+    row(
+        "emergency stop and clear",
+        When::OneBoard,
+        safety::emergency_stop,
+    ),
+    row(
+        "settings saved, read after reset",
+        When::EveryBoard,
+        settings::saved,
+    ),
+    row(
+        "settings that nothing can do",
+        When::OneBoard,
+        settings::refused,
+    ),
     row(
         "power lost in an erase",
-        false,
+        When::Asked,
         settings::power_lost_in_an_erase,
     ),
-    row("chain cut in mid-move", false, safety::chain_cut),
-    row("encoder lost in mid-move", false, motion::encoder_lost),
-    row("motor stalls in mid-move", false, motion::stall),
-    row("motor stalls in a stop", true, motion::stall_in_a_stop),
-    row("host gone in mid-move", false, motion::host_gone),
-    row("reversed motor and encoder", false, motion::reversed),
-    row("homing and 50 poses", false, motion::fifty_poses),
+    row("chain cut in mid-move", When::Asked, safety::chain_cut),
+    row(
+        "encoder lost in mid-move",
+        When::Asked,
+        motion::encoder_lost,
+    ),
+    row("motor stalls in mid-move", When::Asked, motion::stall),
+    row(
+        "motor stalls in a stop",
+        When::OneBoard,
+        motion::stall_in_a_stop,
+    ),
+    row("host gone in mid-move", When::Asked, motion::host_gone),
+    row(
+        "cam of every turn on two turns",
+        When::Asked,
+        motion::turn_cam,
+    ),
+    row("home switch cut", When::Asked, motion::home_switch_cut),
+    row("BiSS-C rings", When::OneBoard, motion::biss_rings),
+    row(
+        "BiSS-C bit flipped in mid-move",
+        When::Asked,
+        motion::biss_bit_flips,
+    ),
+    row("homing by BiSS-C", When::Asked, motion::homing_by_biss),
+    row(
+        "driver's alarm and brakes",
+        When::EveryBoard,
+        safety::driver_alarm,
+    ),
+    row("reversed motor and encoder", When::Asked, motion::reversed),
+    row("homing and 50 poses", When::Asked, motion::fifty_poses),
 ];
 
-const fn row(name: &'static str, is_essential: bool, run: fn(&Path) -> Result<Outcome>) -> Row {
-    Row {
-        name,
-        run,
-        is_essential,
-    }
+const fn row(name: &'static str, when: When, run: fn(&Path) -> Result<Outcome>) -> Row {
+    Row { name, run, when }
 }
 
 /// A chip that has started.
@@ -95,7 +153,7 @@ fn done(rig: Rig, figure: String) -> Result<Outcome> {
 /// Gaps that say nothing about this image: RCC_DCKCFGR2 is the F446's alone, and flash is programmed by
 /// the bench.
 fn is_known(gap: &str) -> bool {
-    gap.contains("0x40023894") || gap.contains("at=0x0800") || gap.contains("DCKCFGR")
+    gap.contains("0x40023894") || gap.contains("at=0x080") || gap.contains("DCKCFGR")
 }
 
 fn boot(elf: &Path) -> Result<Outcome> {
@@ -111,6 +169,11 @@ fn boot(elf: &Path) -> Result<Outcome> {
     ensure!(
         state == ControllerState::Unhomed,
         "it is in {state:?} after the start"
+    );
+    ensure!(
+        identity.board.as_str() == rig.board.name,
+        "it says that it is a {}",
+        identity.board
     );
     let byte_ns = lock(&rig.world).wire.byte_ns.unwrap_or(0);
     let baud = 1e10 / byte_ns.max(1) as f64;

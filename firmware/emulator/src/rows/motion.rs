@@ -6,11 +6,13 @@ use anyhow::{Result, ensure};
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{ControllerState, Message, Move, RequestOutcome, Setting};
 use gonia_protocol::settings::{Axis, Key};
+use gonia_sim::plant::HomeCam;
 
-use super::{Outcome, done, started, trigger};
+use super::{Outcome, done, edges, started, trigger};
 use crate::chips::lock;
 use crate::reference::Reference;
 use crate::rig::Rig;
+use crate::world::RingKind;
 
 /// The pointing limit, degrees.
 const POINTING_DEG: f64 = 0.03;
@@ -18,9 +20,10 @@ const MOVE_US: u64 = 60_000_000;
 
 pub fn three_poses(elf: &Path) -> Result<Outcome> {
     let (mut rig, poses) = poses(elf, 3)?;
+    let edges = edges::on_time(&rig)?;
     let train = trigger::train(&mut rig)?;
     let followed = trigger::follows(&mut rig)?;
-    done(rig, format!("{poses}; {train}; {followed}"))
+    done(rig, format!("{poses}; {edges}; {train}; {followed}"))
 }
 
 pub fn fifty_poses(elf: &Path) -> Result<Outcome> {
@@ -163,4 +166,96 @@ pub fn host_gone(elf: &Path) -> Result<Outcome> {
     let expected = ControllerState::Fault(FaultCode::HOST_WATCHDOG);
     ensure!(state == expected, "it is in {state:?}");
     done(rig, "decelerated, at rest".into())
+}
+
+/// φ, which travels two turns, has a cam that works its home switch once a turn.
+pub fn turn_cam(elf: &Path) -> Result<Outcome> {
+    let mut rig = Rig::power_on(elf)?;
+    lock(&rig.world).axes[1].rebuild(|phi| phi.home_cam = HomeCam::EveryTurn { width_udeg: 2e6 });
+    rig.run_us(100_000)?;
+    rig.hello(7)?;
+    let id = rig.begin(&Message::Home)?;
+    must_fail(rig, id, FaultCode::HOME_AMBIGUOUS)
+}
+
+/// The cable of θ's home switch, which is normally closed.
+pub fn home_switch_cut(elf: &Path) -> Result<Outcome> {
+    let mut rig = started(elf)?;
+    lock(&rig.world).axes[0].plant.cut_switch();
+    let id = rig.begin(&Message::Home)?;
+    must_fail(rig, id, FaultCode::HOME_SWITCH_STUCK)
+}
+
+/// A chip whose rings speak BiSS-C, the second one with a longer acknowledgement.
+fn with_biss(elf: &Path) -> Result<Rig> {
+    let mut rig = started(elf)?;
+    for (i, axis) in Axis::BOTH.into_iter().enumerate() {
+        lock(&rig.world).axes[i].ring = RingKind::BissC {
+            acknowledgement: 1 + 6 * i,
+            flips: None,
+        };
+        let (key, value) = (Key::EncoderKind.number(), 1);
+        rig.ask(&Message::SetSetting(Setting { axis, key, value }))?;
+    }
+    Ok(rig)
+}
+
+/// Both rings are read at rest; then a bit of φ's words flips on the way.
+pub fn biss_rings(elf: &Path) -> Result<Outcome> {
+    let mut rig = with_biss(elf)?;
+    rig.run_us(200_000)?;
+    let status = rig.status()?;
+    let is = lock(&rig.world).true_deg();
+    let off_deg = [0, 1].map(|i| f64::from(status.axes[i].encoder_udeg) * 1e-6 - is[i]);
+    ensure!(
+        status.state == ControllerState::Unhomed && off_deg.iter().all(|off| off.abs() < 0.01),
+        "{:?}, {off_deg:?}° off",
+        status.state
+    );
+    flip_lowest_bit(&rig);
+    rig.run_us(200_000)?;
+    let state = rig.status()?.state;
+    let expected = ControllerState::Fault(FaultCode::ENCODER_LOST);
+    ensure!(state == expected, "with a flipped bit it is in {state:?}");
+    let figure = format!(
+        "read at {:.3}°, {:.3}°; a flipped bit is found",
+        is[0], is[1]
+    );
+    done(rig, figure)
+}
+
+/// The lowest bit of φ's position is the wrong way round in every word from now on.
+fn flip_lowest_bit(rig: &Rig) {
+    // Rest, acknowledgement, start, control data, 17 bits before it.
+    let lowest = 2 + 7 + 2 + 17;
+    lock(&rig.world).axes[1].ring = RingKind::BissC {
+        acknowledgement: 7,
+        flips: Some(lowest),
+    };
+}
+
+pub fn homing_by_biss(elf: &Path) -> Result<Outcome> {
+    let mut rig = with_biss(elf)?;
+    rig.complete(&Message::Home, MOVE_US)?;
+    let target_udeg = [12_000_000, -170_000_000];
+    rig.complete(&Message::Move(Move { target_udeg }), MOVE_US)?;
+    let is = lock(&rig.world).true_deg();
+    let off = [is[0] - 12.0, is[1] + 170.0];
+    ensure!(
+        off.iter().all(|off| off.abs() < POINTING_DEG),
+        "{off:?}° off"
+    );
+    done(
+        rig,
+        format!("homes, and stands at {:.3}°, {:.3}°", is[0], is[1]),
+    )
+}
+
+/// A flipped bit in mid-move.
+pub fn biss_bit_flips(elf: &Path) -> Result<Outcome> {
+    let mut rig = with_biss(elf)?;
+    let id = rig.begin(&Message::Home)?;
+    rig.run_us(600_000)?;
+    flip_lowest_bit(&rig);
+    must_fail(rig, id, FaultCode::ENCODER_LOST)
 }

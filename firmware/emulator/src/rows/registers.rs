@@ -2,22 +2,19 @@
 
 use std::path::Path;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
+use gonia_pins::Board;
 
 use super::{Outcome, done, started};
+use crate::bench::Command;
 use crate::chips::lock;
+use crate::nvic::Interrupt;
 
 /// What a register must hold: name, address, the bits that count, their value, why.
 type Expected = (&'static str, u64, u32, u32, &'static str);
 
+/// The same on every board.
 const EXPECTED: &[Expected] = &[
-    (
-        "RCC_PLLCFGR",
-        0x4002_3804,
-        0x0043_7FFF,
-        0x0040_2A04,
-        "HSE 8 MHz / 4 · 168 / 2 = 168 MHz (6.3.2)",
-    ),
     (
         "RCC_CFGR",
         0x4002_3808,
@@ -31,6 +28,13 @@ const EXPECTED: &[Expected] = &[
         0x70F,
         0x705,
         "5 wait states at 168 MHz, prefetch, caches (3.8.1)",
+    ),
+    (
+        "FLASH_OPTCR",
+        0x4002_3C14,
+        0xC,
+        0,
+        "brown-out level 3: reset below 2.7 V, which 168 MHz and erasing by words need (2.6, 3.6.2)",
     ),
     (
         "TIM3_PSC",
@@ -77,21 +81,6 @@ const EXPECTED: &[Expected] = &[
         0x10,
         "its enable is its trigger output",
     ),
-    ("TIM8_CCMR1", 0x4001_0418, 0x73, 0x70, "PWM 2: low at rest"),
-    (
-        "SPI1_CR1",
-        0x4001_3000,
-        0x3B,
-        0x3A & 0x3B,
-        "84 MHz / 256 = 328 kHz, clock high at rest",
-    ),
-    (
-        "SPI2_CR1",
-        0x4000_3800,
-        0x3B,
-        0x32 & 0x3B,
-        "42 MHz / 128 = 328 kHz, clock high at rest",
-    ),
     ("IWDG_PR", 0x4000_3004, 7, 3, "/ 32: 1 kHz"),
     ("IWDG_RLR", 0x4000_3008, 0xFFF, 100, "100 ms"),
     (
@@ -104,24 +93,91 @@ const EXPECTED: &[Expected] = &[
     ("DBGMCU_APB2_FZ", 0xE004_200C, 2, 2, "and TIM8"),
 ];
 
+/// What depends on the board: the divider of its crystal, its relay's channel, its encoders' SPIs.
+fn of_board(board: &Board) -> Vec<Expected> {
+    let prediv = board.crystal.hz / 2_000_000;
+    let mut expected: Vec<Expected> = vec![(
+        "RCC_PLLCFGR",
+        0x4002_3804,
+        0x0043_7FFF,
+        0x0040_2A00 | prediv,
+        "HSE to 2 MHz, · 168 / 2 = 168 MHz (6.3.2)",
+    )];
+    let mut enabled = 0;
+    for output in [Some(board.relay), board.brakes].into_iter().flatten() {
+        let channel = u32::from(output.channel) - 1;
+        let shift = 8 * (channel % 2);
+        expected.push((
+            "TIM8_CCMR of relay or brakes",
+            0x4001_0418 + 4 * u64::from(channel / 2),
+            0x73 << shift,
+            0x70 << shift,
+            "PWM 2: low at rest",
+        ));
+        enabled |= if output.is_complementary { 4 } else { 1 } << (4 * channel);
+    }
+    expected.push((
+        "TIM8_CCER",
+        0x4001_0420,
+        0xFFFF,
+        enabled,
+        "the outputs of relay and brakes, and no other",
+    ));
+    for axis in board.axes {
+        expected.push(match axis.encoder.spi {
+            1 => ("SPI1_CR1", 0x4001_3000, 0x3B, 0x3A, SSI_BY_256),
+            2 => ("SPI2_CR1", 0x4000_3800, 0x3B, 0x32, SSI_BY_128),
+            3 => ("SPI3_CR1", 0x4000_3C00, 0x3B, 0x32, SSI_BY_128),
+            _ => ("SPI4_CR1", 0x4001_3400, 0x3B, 0x3A, SSI_BY_256),
+        });
+    }
+    expected
+}
+
+const SSI_BY_256: &str = "84 MHz / 256 = 328 kHz, clock high at rest";
+const SSI_BY_128: &str = "42 MHz / 128 = 328 kHz, clock high at rest";
+
+/// An interrupt: its number (RM0390, table 38), and the priority that it must have, 0 first.
+const PRIORITIES: &[(&str, usize, u8)] = &[
+    ("TIM2, φ's steps", 28, 0),
+    ("TIM5, θ's steps", 50, 0),
+    ("TIM3, time and trigger", 29, 1),
+    ("USART2, the host", 38, 4),
+];
+/// SCB_AIRCR.PRIGROUP up to which all four priority bits preempt.
+const ALL_PREEMPT: u8 = 3;
+
 /// Fastest clock for 50 m of cable, Hz.
 const SSI_HZ: f64 = 400_000.0;
 
 pub fn as_the_manual_says(elf: &Path) -> Result<Outcome> {
     let mut rig = started(elf)?;
     let mut wrong = Vec::new();
-    for &(name, address, mask, expected, why) in EXPECTED {
+    let mut all = of_board(rig.board);
+    all.extend(EXPECTED);
+    for &(name, address, mask, expected, why) in &all {
         let is = rig.peek(address)? & mask;
         if is != expected {
             wrong.push(format!("{name} is {is:#x} where {expected:#x} means {why}"));
+        }
+    }
+    for &(name, number, expected) in PRIORITIES {
+        let word = rig.act(Command::Interrupt(number))?;
+        let is =
+            Interrupt::from_word(word).context("the core's state has no NVIC that is known")?;
+        if !is.is_enabled || is.priority != expected || is.group > ALL_PREEMPT {
+            wrong.push(format!(
+                "interrupt {number} ({name}) is {is:?}, not of priority {expected}"
+            ));
         }
     }
     ensure!(wrong.is_empty(), "{}", wrong.join("; "));
     let hz = [0, 1].map(|i| lock(&rig.world).axes[i].ssi_hz);
     ensure!(hz.iter().all(|&hz| hz <= SSI_HZ), "SSI at {hz:?} Hz");
     let figure = format!(
-        "{} registers; SSI at {:.0} and {:.0} Hz",
-        EXPECTED.len(),
+        "{} registers, {} priorities; SSI at {:.0} and {:.0} Hz",
+        all.len(),
+        PRIORITIES.len(),
         hz[0],
         hz[1]
     );

@@ -3,10 +3,14 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use gonia_protocol::message::{ControllerState, Message, RequestRefusal, ResetReason};
+use gonia_protocol::fault::FaultCode;
+use gonia_protocol::message::{
+    ControllerState, Message, RequestOutcome, RequestRefusal, ResetReason, Setting,
+};
+use gonia_protocol::settings::{Axis, Key};
 
 use super::motion::under_way;
-use super::{Outcome, done};
+use super::{Outcome, done, started};
 use crate::bench::Command;
 use crate::chips::lock;
 use crate::rig::Rig;
@@ -29,6 +33,18 @@ fn steps_since(rig: &Rig, since_us: u64, before: [u64; 2]) -> (u64, u64) {
     (steps, last_ns.unwrap_or(0).saturating_sub(since_us * 1000))
 }
 
+/// How long after a moment the brakes have engaged, while the drivers still had their current, ns.
+fn engaged_after_ns(rig: &Rig, since_ns: u64) -> Result<u64> {
+    let power = lock(&rig.world).power.clone();
+    let engaged = power.iter().find(|&&(at, ..)| at >= since_ns);
+    let &(at, enabled, released) = engaged.context("brakes and drivers stay as they are")?;
+    ensure!(
+        enabled && !released,
+        "drivers on: {enabled}, brakes let go: {released}"
+    );
+    Ok(at - since_ns)
+}
+
 pub fn processor_stops(elf: &Path) -> Result<Outcome> {
     let (mut rig, _) = under_way(elf)?;
     let (at_us, before) = (rig.now_us(), lock(&rig.world).edges());
@@ -48,6 +64,15 @@ pub fn processor_stops(elf: &Path) -> Result<Outcome> {
         last_ns / 1_000_000
     );
     let (reset_ns, cause) = reset.context("the watchdog did not restart the chip")?;
+    let engaged_ns = match rig.board.brakes {
+        Some(_) => engaged_after_ns(&rig, at_us * 1000)?,
+        None => 0,
+    };
+    ensure!(
+        engaged_ns <= LAST_PULSE_NS,
+        "the brakes have engaged {} ms later",
+        engaged_ns / 1_000_000
+    );
     let reset_ns = reset_ns - at_us * 1000;
     ensure!(
         reset_ns <= RESET_NS,
@@ -62,8 +87,9 @@ pub fn processor_stops(elf: &Path) -> Result<Outcome> {
         identity.reset
     );
     let figure = format!(
-        "{steps} steps, the last {:.1} ms later; reset after {} ms",
+        "{steps} steps, the last {:.1} ms later; brakes after {:.1} ms, reset after {} ms",
         last_ns as f64 * 1e-6,
+        engaged_ns as f64 * 1e-6,
         reset_ns / 1_000_000
     );
     done(rig, figure)
@@ -104,10 +130,7 @@ pub fn reset_in_mid_move(elf: &Path) -> Result<Outcome> {
     {
         let world = lock(&rig.world);
         ensure!(steps == 0, "{steps} steps in reset");
-        ensure!(
-            !world.axes.iter().any(|axis| axis.is_enabled),
-            "the drivers have current in reset"
-        );
+        ensure!(!world.drivers_are_on(), "the drivers have current in reset");
         ensure!(!world.chain_is_closed(), "the chain is closed in reset");
     }
     rig.act(Command::HoldCore(false))?;
@@ -163,6 +186,61 @@ pub fn chain_cut(elf: &Path) -> Result<Outcome> {
     let figure = format!(
         "{steps} steps within {:.1} ms; homed again",
         last_ns as f64 * 1e-6
+    );
+    done(rig, figure)
+}
+
+/// θ's driver reports an alarm in mid-move, on an arm with brakes.
+pub fn driver_alarm(elf: &Path) -> Result<Outcome> {
+    const BRAKE_US: u64 = 50_000;
+    let mut rig = started(elf)?;
+    if rig.board.alarms.is_none() || rig.board.brakes.is_none() {
+        return done(rig, "the board has none".into());
+    }
+    let mut set = |axis, key: Key, value| {
+        let key = key.number();
+        rig.ask(&Message::SetSetting(Setting { axis, key, value }))
+    };
+    set(Axis::Theta, Key::DriverAlarm, 1)?;
+    set(Axis::Theta, Key::BrakeTime, BRAKE_US as i32)?;
+    let id = rig.begin(&Message::Home)?;
+    rig.run_us(600_000)?;
+    let at_us = rig.now_us();
+    lock(&rig.world).axes[0].alarm_closed = false;
+    let outcome = rig.outcome(id, 1_000_000)?;
+    let expected = RequestOutcome::Failed(FaultCode::DRIVER_ALARM);
+    ensure!(outcome == expected, "it ended as {outcome:?}");
+    rig.run_us(200_000)?;
+    let engaged_ns = engaged_after_ns(&rig, at_us * 1000)?;
+    let last = lock(&rig.world).power.last().copied();
+    let (off_ns, enabled, _) = last.context("brakes and drivers stay as they are")?;
+    let off_ns = off_ns - at_us * 1000;
+    ensure!(!enabled, "the drivers keep their current");
+    ensure!(
+        off_ns >= engaged_ns + BRAKE_US * 1000,
+        "drivers off {} ms after the brakes",
+        (off_ns - engaged_ns) / 1_000_000
+    );
+    let refusal = rig.refusal(&Message::ClearFault)?;
+    let expected = RequestRefusal::CauseRemains(FaultCode::DRIVER_ALARM);
+    ensure!(refusal == expected, "{refusal:?}");
+    lock(&rig.world).axes[0].alarm_closed = true;
+    rig.run_us(50_000)?;
+    rig.begin(&Message::ClearFault)?;
+    // The way home begins while the brakes still hold.
+    rig.begin(&Message::Home)?;
+    let before = lock(&rig.world).edges();
+    rig.run_us(300_000)?;
+    let steps: u64 = lock(&rig.world).edges().iter().sum();
+    let unheard: u64 = lock(&rig.world).axes.iter().map(|axis| axis.unheard).sum();
+    ensure!(
+        steps > before.iter().sum() && unheard == 0,
+        "{unheard} of {steps} steps against the brakes"
+    );
+    let figure = format!(
+        "brakes after {:.1} ms, drivers off after {:.1} ms; no step before they are back",
+        engaged_ns as f64 * 1e-6,
+        off_ns as f64 * 1e-6
     );
     done(rig, figure)
 }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use gonia_firmware::store::RECORD_MAX;
+use gonia_pins::check::sector_len;
 use gonia_protocol::message::{ControllerState, Message, RequestRefusal, Setting, SettingName};
 use gonia_protocol::settings::{Axis, Key};
 
@@ -11,8 +13,12 @@ use crate::bench::Command;
 use crate::chips::lock;
 use crate::rig::Rig;
 
-/// Records that a sector of 16 kB holds.
-const SLOTS: i32 = 31;
+/// Records that a sector of the board's settings holds.
+fn slots(rig: &Rig) -> Result<i32> {
+    let at = rig.board.layout.settings[0];
+    let len = sector_len(at).context("the settings lie in no sector")?;
+    Ok(len as i32 / RECORD_MAX as i32)
+}
 
 fn set(rig: &mut Rig, key: Key, value: i32) -> Result<Message> {
     let key = key.number();
@@ -76,12 +82,13 @@ pub fn saved(elf: &Path) -> Result<Outcome> {
 
 pub fn power_lost_in_an_erase(elf: &Path) -> Result<Outcome> {
     let mut rig = started(elf)?;
-    for i in 0..SLOTS {
+    let slots = slots(&rig)?;
+    for i in 0..slots {
         set(&mut rig, Key::Telemetry, 300_000 + i)?;
         rig.begin(&Message::SaveSettings)?;
     }
     let erases = lock(&rig.world).erases;
-    ensure!(erases == 1, "{erases} erases for {SLOTS} saves");
+    ensure!(erases == 1, "{erases} erases for {slots} saves");
     // The next one erases the other sector.
     set(&mut rig, Key::Telemetry, 999_999)?;
     rig.send(&Message::SaveSettings)?;
@@ -89,12 +96,12 @@ pub fn power_lost_in_an_erase(elf: &Path) -> Result<Outcome> {
     ensure!(lock(&rig.world).erases == 2, "no erase is under way");
     restart(&mut rig, 8)?;
     let telemetry = get(&mut rig, Key::Telemetry)?;
-    ensure!(telemetry == 300_000 + SLOTS - 1, "{telemetry} came back");
+    ensure!(telemetry == 300_000 + slots - 1, "{telemetry} came back");
     let state = rig.status()?.state;
     ensure!(state == ControllerState::Unhomed, "it is in {state:?}");
     done(
         rig,
-        format!("the old ones are there; {erases} erase for {SLOTS} saves"),
+        format!("the old ones are there; {erases} erase for {slots} saves"),
     )
 }
 

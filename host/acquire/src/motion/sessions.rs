@@ -22,6 +22,14 @@ pub struct Factor {
     pub values: &'static [f64],
 }
 
+/// The speed.
+pub(super) const SPEED: Factor = Factor {
+    key: Key::MaxSpeed,
+    unit: "deg/s",
+    scale: 1e6,
+    values: &[4.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 39.0],
+};
+
 /// What is varied.
 pub const FACTORS: [Factor; 5] = [
     Factor {
@@ -36,12 +44,7 @@ pub const FACTORS: [Factor; 5] = [
         scale: 1e6,
         values: &[0.002, 0.003, 0.004, 0.006, 0.008, 0.012, 0.02, 0.03],
     },
-    Factor {
-        key: Key::MaxSpeed,
-        unit: "deg/s",
-        scale: 1e6,
-        values: &[4.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 39.0],
-    },
+    SPEED,
     Factor {
         key: Key::Acceleration,
         unit: "deg/s2",
@@ -93,11 +96,19 @@ pub fn motion_rows(stretches: &[Vec<Pose>], seed: u64) -> Vec<MotionRow> {
         .flat_map(|factor| factor.values.iter().map(move |value| (factor, *value)))
         .collect();
     jobs.into_par_iter()
-        .map(|(factor, value)| row(factor, value, stretches, seed))
+        .map(|(factor, value)| {
+            row(
+                factor,
+                value,
+                stretches,
+                SimRig::new(seed, FaultPlan::default()),
+            )
+        })
         .collect()
 }
 
-fn row(factor: &Factor, value: f64, stretches: &[Vec<Pose>], seed: u64) -> MotionRow {
+/// Sessions on this rig, with one setting at one value.
+pub(super) fn row(factor: &Factor, value: f64, stretches: &[Vec<Pose>], rig: SimRig) -> MotionRow {
     let setting = (value * factor.scale).round() as i32;
     let mut row = MotionRow {
         setting: factor.key.meaning().name,
@@ -113,7 +124,6 @@ fn row(factor: &Factor, value: f64, stretches: &[Vec<Pose>], seed: u64) -> Motio
         max_deg: f64::NAN,
         stopped: None,
     };
-    let rig = SimRig::new(seed, FaultPlan::default());
     let (mut errors, mut steps_s) = (Vec::new(), Vec::new());
     let run = measure(
         &rig,

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// A filled cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bin {
+pub struct Bin<const N: usize = 3> {
     /// The cell, see [`Grid::cell`].
     pub cell: u32,
     /// Number of samples.
@@ -20,9 +20,9 @@ pub struct Bin {
     /// Their frame when all came from the same one, else [`Sample::NO_FRAME`].
     pub frame: u32,
     /// Median per channel.
-    pub median: [f32; 3],
+    pub median: [f32; N],
     /// Median absolute deviation from the median, per channel; 0 for a single sample.
-    pub mad: [f32; 3],
+    pub mad: [f32; N],
     /// Mean of the light directions, a unit vector. The samples sit off the node, and a value
     /// belongs to where it was measured.
     pub light: [f32; 3],
@@ -32,17 +32,17 @@ pub struct Bin {
 
 /// All filled cells of a grid, in ascending order of the cell.
 #[derive(Clone, Debug)]
-pub struct Bins {
+pub struct Bins<const N: usize = 3> {
     grid: Grid,
-    bins: Vec<Bin>,
+    bins: Vec<Bin<N>>,
     outside: usize,
     noise_variance: Option<f32>,
 }
 
-impl Bins {
+impl<const N: usize> Bins<N> {
     /// Bins samples to their nearest nodes. Samples beyond the grid's last polar angle, and samples
     /// with a value or an angle that is not finite, are counted as outside.
-    pub fn new(grid: Grid, samples: &[Sample]) -> Self {
+    pub fn new(grid: Grid, samples: &[Sample<N>]) -> Self {
         // Sorting ten million cells at once goes through memory many times. Sorted by their light
         // first, each light's thousand samples fit the nearest cache.
         let size = samples.len().div_ceil(4 * rayon::current_num_threads());
@@ -54,12 +54,12 @@ impl Bins {
         let nodes = Nodes::new(grid);
         let lights: Vec<usize> = (0..grid.n_directions()).collect();
         let noise_one_in = samples.len().div_ceil(NOISE_SAMPLES).max(1) | 1;
-        let (parts, variances): (Vec<Vec<Bin>>, Vec<Vec<f32>>) = lights
+        let (parts, variances): (Vec<Vec<Bin<N>>>, Vec<Vec<f32>>) = lights
             .par_chunks(LIGHTS_AT_A_TIME)
             .map(|lights| {
                 let mut scratch = Vec::new();
                 let mut keys: Vec<u64> = Vec::new();
-                let mut sorted: Vec<Sample> = Vec::new();
+                let mut sorted: Vec<Sample<N>> = Vec::new();
                 // Room for one bin a sample: memory that is not touched costs nothing.
                 let samples_here =
                     |light: &usize| shares.iter().map(|s| s.of(*light).len()).sum::<usize>();
@@ -105,7 +105,7 @@ impl Bins {
     }
 
     /// The filled cells.
-    pub fn bins(&self) -> &[Bin] {
+    pub fn bins(&self) -> &[Bin<N>] {
         &self.bins
     }
 
@@ -120,12 +120,31 @@ impl Bins {
     /// The noise of samples is as much above the value as below it, but their logarithms lie lower in the mean, by half of
     /// the median's relative variance: nothing at 1.5 % of noise, and two per cent of a single sample at the 20 %
     /// of a coarse yarn, which no averaging over bins would take away.
-    pub fn log_value(&self, bin: &Bin, channel: usize, floor: f32) -> f32 {
+    pub fn log_value(&self, bin: &Bin<N>, channel: usize, floor: f32) -> f32 {
         let variance = self
             .noise_variance
             .map_or(0.0, |v| v.min(NOISE_MAX * NOISE_MAX));
         let of_bin = variance * variance_of_median(bin.count) / bin.count.max(1) as f32;
         bin.median[channel].max(floor).natural_log() + 0.5 * of_bin
+    }
+
+    /// The same bins with one of their channels.
+    pub fn channel(&self, channel: usize) -> Bins<1> {
+        let of_bin = |bin: &Bin<N>| Bin {
+            cell: bin.cell,
+            count: bin.count,
+            frame: bin.frame,
+            median: [bin.median[channel]],
+            mad: [bin.mad[channel]],
+            light: bin.light,
+            view: bin.view,
+        };
+        Bins {
+            grid: self.grid,
+            bins: self.bins.iter().map(of_bin).collect(),
+            outside: self.outside,
+            noise_variance: self.noise_variance,
+        }
     }
 
     /// How many samples fell outside the grid.
@@ -149,7 +168,7 @@ fn number_of(key: u64) -> usize {
 }
 
 /// All parts in one, by all threads: the new memory costs more than the copying.
-fn joined(parts: &[Vec<Bin>]) -> Vec<Bin> {
+fn joined<const N: usize>(parts: &[Vec<Bin<N>>]) -> Vec<Bin<N>> {
     let mut count = 0;
     let starts: Vec<usize> = parts
         .iter()
@@ -191,7 +210,7 @@ struct ByLight {
 
 impl ByLight {
     /// `first` is the number of the first sample.
-    fn new(grid: Grid, samples: &[Sample], first: usize) -> Self {
+    fn new<const N: usize>(grid: Grid, samples: &[Sample<N>], first: usize) -> Self {
         let mut starts = vec![0u32; grid.n_directions() + 1];
         let nodes: Vec<(u32, u32)> = samples
             .iter()
@@ -229,7 +248,7 @@ impl ByLight {
 }
 
 /// The nodes of light and view of a sample within the grid.
-fn nodes_of(grid: Grid, s: &Sample) -> Option<(u32, u32)> {
+fn nodes_of<const N: usize>(grid: Grid, s: &Sample<N>) -> Option<(u32, u32)> {
     if !s.rgb.iter().all(|v| v.is_finite()) {
         return None;
     }
@@ -238,26 +257,26 @@ fn nodes_of(grid: Grid, s: &Sample) -> Option<(u32, u32)> {
     Some((light as u32, view as u32))
 }
 
-fn summarize(
+fn summarize<const N: usize>(
     cell: usize,
     (light, view): (Node, Node),
-    group: &[Sample],
+    group: &[Sample<N>],
     scratch: &mut Vec<f32>,
-) -> Bin {
+) -> Bin<N> {
     let mut frame = group[0].frame;
     if group.iter().any(|s| s.frame != frame) {
         frame = Sample::NO_FRAME;
     }
     let (value, mad) = match group {
         // Many bins are one of these two.
-        [one] => (one.rgb, [0.0; 3]),
+        [one] => (one.rgb, [0.0; N]),
         [a, b] => (
-            [0, 1, 2].map(|c| 0.5 * (a.rgb[c] + b.rgb[c])),
-            [0, 1, 2].map(|c| 0.5 * (a.rgb[c] - b.rgb[c]).abs()),
+            std::array::from_fn(|c| 0.5 * (a.rgb[c] + b.rgb[c])),
+            std::array::from_fn(|c| 0.5 * (a.rgb[c] - b.rgb[c]).abs()),
         ),
         _ => {
-            let (mut value, mut mad) = ([0.0; 3], [0.0; 3]);
-            for c in 0..3 {
+            let (mut value, mut mad) = ([0.0; N], [0.0; N]);
+            for c in 0..N {
                 scratch.clear();
                 scratch.extend(group.iter().map(|s| s.rgb[c]));
                 value[c] = median(scratch);
@@ -329,6 +348,8 @@ mod tests {
         assert_eq!((bin.count, bin.frame), (3, 3));
         assert_eq!(bin.median, [2.0, 4.0, 6.0]);
         assert_eq!(bin.mad, [1.0, 2.0, 3.0]);
+        let green = bins.channel(1);
+        assert_eq!((green.bins()[0].median, green.outside()), ([4.0], 2));
         let mean = Direction::from_vec3(bin.light.map(f64::from));
         assert!((mean.theta_deg() - 40.17).abs() < 0.01, "{mean:?}");
         assert!(mean.phi_deg() < 1e-3 || mean.phi_deg() > 359.999);

@@ -21,11 +21,11 @@ const ROUNDING: f64 = 1e-5;
 /// Variances of the logarithm, per channel, of the samples of one cell about the plane that fits them best, each
 /// over the first quartile of what a variance of one would show; `None` where a plane takes all they
 /// tell, or a value has no logarithm.
-pub fn variances_about_plane(group: &[Sample]) -> Option<[f32; 3]> {
+pub fn variances_about_plane<const N: usize>(group: &[Sample<N>]) -> Option<[f32; N]> {
     if group.len() < 2 || group.iter().any(|s| s.rgb.iter().any(|v| *v <= 0.0)) {
         return None;
     }
-    let angles = |s: &Sample| {
+    let angles = |s: &Sample<N>| {
         let light = Direction::from_deg(s.theta_i_deg.into(), s.phi_i_deg.into()).to_vec3();
         let view = Direction::from_deg(s.theta_v_deg.into(), s.phi_v_deg.into()).to_vec3();
         [light[0], light[1], light[2], view[0], view[1], view[2]]
@@ -34,8 +34,8 @@ pub fn variances_about_plane(group: &[Sample]) -> Option<[f32; 3]> {
     let mut columns: Vec<Vec<f64>> = (0..COLUMNS)
         .map(|k| centred(places.iter().map(|p| p[k])))
         .collect();
-    let mut values =
-        [0, 1, 2].map(|c| centred(group.iter().map(|s| f64::from(s.rgb[c]).natural_log())));
+    let mut values: [Vec<f64>; N] =
+        std::array::from_fn(|c| centred(group.iter().map(|s| f64::from(s.rgb[c]).natural_log())));
     // Gram and Schmidt, the widest direction first.
     let mut freedom = group.len() - 1;
     let mut widest = ROUNDING / SPREAD_MIN;

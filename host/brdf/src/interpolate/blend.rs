@@ -12,26 +12,26 @@ use crate::quantile::median;
 use rayon::prelude::*;
 
 /// Logarithms at the corners of all pairs of patches, and their means over the pairs that meet.
-pub struct Corners {
+pub struct Corners<const N: usize = 3> {
     /// Places of the patches' corners: where those of each patch begin, and the end of the last.
     starts: Vec<usize>,
     /// For each patch, the values of its pairs with itself and all later patches: corner by corner of
     /// the first, corner by corner of the second.
-    values: Vec<Vec<[f32; 3]>>,
+    values: Vec<Vec<[f32; N]>>,
     /// Of the same pairs, whether their cells follow from their corners.
     smooth: Vec<Vec<bool>>,
     /// Means by pair of corners (v, w), v ≤ w: row v begins at `v n − v (v + 1) / 2`.
-    means: Vec<[f32; 3]>,
+    means: Vec<[f32; N]>,
     /// Number of corners.
     n: usize,
     /// By how much a corner may shift a pair.
     limit: f32,
 }
 
-impl Corners {
+impl<const N: usize> Corners<N> {
     /// Averages. `values`: for each patch, what its pairs with itself and all later ones give at
     /// their corners, and whether their cells follow from these.
-    pub fn new(cover: &Cover, values: Vec<(Vec<[f32; 3]>, Vec<bool>)>, least_limit: f32) -> Self {
+    pub fn new(cover: &Cover, values: Vec<(Vec<[f32; N]>, Vec<bool>)>, least_limit: f32) -> Self {
         let (values, smooth) = values.into_iter().unzip();
         let mut starts = vec![0];
         for (k, patch) in cover.patches.iter().enumerate() {
@@ -86,12 +86,12 @@ impl Corners {
     }
 
     /// Mean over all pairs of patches; both orders of light and view count.
-    fn mean_over(&self, first: &[(usize, usize)], second: &[(usize, usize)]) -> [f32; 3] {
-        let mut sum = [0.0; 3];
+    fn mean_over(&self, first: &[(usize, usize)], second: &[(usize, usize)]) -> [f32; N] {
+        let mut sum = [0.0f32; N];
         let mut add = |p: usize, i: usize, q: usize, j: usize| {
             let width = self.starts[q + 1] - self.starts[q];
             let value = self.of_pair(p, q)[i * width + j];
-            for c in 0..3 {
+            for c in 0..N {
                 sum[c] += value[c];
             }
         };
@@ -110,13 +110,13 @@ impl Corners {
     }
 
     /// What patches `p` ≤ `q` gave at their corners.
-    fn of_pair(&self, p: usize, q: usize) -> &[[f32; 3]] {
+    fn of_pair(&self, p: usize, q: usize) -> &[[f32; N]] {
         let height = self.starts[p + 1] - self.starts[p];
         let from = height * (self.starts[q] - self.starts[p]);
         &self.values[p][from..from + height * (self.starts[q + 1] - self.starts[q])]
     }
 
-    fn mean(&self, v: u32, w: u32) -> [f32; 3] {
+    fn mean(&self, v: u32, w: u32) -> [f32; N] {
         let (v, w) = (v.min(w) as usize, v.max(w) as usize);
         self.means[v * self.n - v * (v + 1) / 2 + w]
     }
@@ -132,8 +132,8 @@ impl Corners {
         &self,
         cover: &Cover,
         (p, q): (usize, usize),
-        logs: &mut Vec<[f32; 3]>,
-        shifts: &mut Shifts,
+        logs: &mut Vec<[f32; N]>,
+        shifts: &mut Shifts<N>,
     ) {
         let own = self.of_pair(p, q);
         let smooth = self.is_smooth(p, q);
@@ -148,7 +148,7 @@ impl Corners {
         match weights_of(p, q) {
             Some(weights) if smooth => {
                 for (shift, own) in shifts.at_corners.iter_mut().zip(own) {
-                    *shift = [0, 1, 2].map(|c| own[c] + shift[c]);
+                    *shift = std::array::from_fn(|c| own[c] + shift[c]);
                 }
                 let cells = (p.directions.len(), q.directions.len());
                 shifts
@@ -172,28 +172,28 @@ pub fn limit_of(differences: &mut [f32], least: f32) -> f32 {
 }
 
 /// The largest difference in a channel.
-pub fn difference(own: [f32; 3], mean: [f32; 3]) -> f32 {
-    (0..3).fold(0.0f32, |m, c| m.max((mean[c] - own[c]).abs()))
+pub fn difference<const N: usize>(own: [f32; N], mean: [f32; N]) -> f32 {
+    (0..N).fold(0.0f32, |m, c| m.max((mean[c] - own[c]).abs()))
 }
 
 /// What a thread adds to cells, and room to work in.
 #[derive(Default)]
-pub struct Shifts {
+pub struct Shifts<const N: usize = 3> {
     /// At pairs of corners, corner by corner of the first patch.
-    at_corners: Vec<[f32; 3]>,
-    row: Vec<[f32; 3]>,
-    from_corners: FromCorners,
+    at_corners: Vec<[f32; N]>,
+    row: Vec<[f32; N]>,
+    from_corners: FromCorners<N>,
 }
 
-impl Shifts {
+impl<const N: usize> Shifts<N> {
     /// Forgets all corners.
     pub fn clear(&mut self) {
         self.at_corners.clear();
     }
 
     /// The next pair of corners: shifts `own` to `mean`, but by no more than `limit` in any channel.
-    pub fn push(&mut self, own: [f32; 3], mean: [f32; 3], limit: f32) {
-        let shift = [0, 1, 2].map(|c| mean[c] - own[c]);
+    pub fn push(&mut self, own: [f32; N], mean: [f32; N], limit: f32) {
+        let shift: [f32; N] = std::array::from_fn(|c| mean[c] - own[c]);
         let largest = difference(own, mean);
         let share = if largest > limit {
             limit / largest
@@ -204,7 +204,7 @@ impl Shifts {
     }
 
     /// Adds what is linear between the corners of a pair to its cells, light by light.
-    pub fn apply(&mut self, p: &Patch, q: &Patch, logs: &mut [[f32; 3]]) {
+    pub fn apply(&mut self, p: &Patch, q: &Patch, logs: &mut [[f32; N]]) {
         let width = q.corners.len();
         for (between, logs) in p
             .between
@@ -213,12 +213,12 @@ impl Shifts {
         {
             // At this light, for each corner of the views.
             self.row.clear();
-            self.row.resize(width, [0.0; 3]);
+            self.row.resize(width, [0.0; N]);
             for (corner, weight) in between {
                 let from = *corner as usize * width;
                 let at_corners = &self.at_corners[from..from + width];
                 for (sum, shift) in self.row.iter_mut().zip(at_corners) {
-                    for c in 0..3 {
+                    for c in 0..N {
                         sum[c] += weight * shift[c];
                     }
                 }
@@ -226,7 +226,7 @@ impl Shifts {
             for (between, log) in q.between.iter().zip(logs) {
                 for (corner, weight) in between {
                     let shift = self.row[*corner as usize];
-                    for c in 0..3 {
+                    for c in 0..N {
                         log[c] += weight * shift[c];
                     }
                 }

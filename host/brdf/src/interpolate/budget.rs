@@ -7,6 +7,7 @@
 //! sample of all pairs, are no more. On a dense plan few exceed it, and nothing is raised.
 
 use super::FillSettings;
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::hierarchy::Neighbours;
 use super::patches::Cover;
 use super::refine::Refiner;
@@ -19,11 +20,14 @@ const ROUND: f32 = 0.01;
 
 /// The smallest tolerance, from `settings.tolerance` on, with which refinement costs no more than
 /// `settings.budget` fine blocks a pair of patches.
-pub fn affordable_tolerance(
-    data: &(impl Neighbours + Sync),
+pub fn affordable_tolerance<const N: usize>(
+    data: &(impl Neighbours<N> + Sync),
     cover: &Cover,
     settings: &FillSettings,
-) -> f32 {
+) -> f32
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     if !settings.refines() || settings.budget == f32::INFINITY {
         return settings.tolerance;
     }
@@ -35,7 +39,7 @@ pub fn affordable_tolerance(
     let mut deviations: Vec<f32> = (0..sampled)
         .into_par_iter()
         .map_init(
-            || Refiner::new(settings),
+            || Refiner::<N>::new(settings),
             |refiner, k| {
                 let (p, q) = pairs[scattered(k, stride, pairs.len())];
                 let pair = (&cover.patches[p], &cover.patches[q]);

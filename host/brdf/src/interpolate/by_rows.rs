@@ -6,6 +6,7 @@
 
 use super::FillSettings;
 use super::blend::{Corners, Shifts};
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::exponential::exponentials;
 use super::fill::{FillError, Task};
@@ -17,26 +18,29 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A fill of which the rows are still to be made.
-pub struct ByRows<'a> {
-    task: Task<'a>,
-    corners: Corners,
+pub struct ByRows<'a, const N: usize = 3> {
+    task: Task<'a, N>,
+    corners: Corners<N>,
 }
 
 /// Working memory of one thread.
-struct Work {
-    refiner: Refiner,
-    logs: Vec<[f32; 3]>,
-    shifts: Shifts,
+struct Work<const N: usize> {
+    refiner: Refiner<N>,
+    logs: Vec<[f32; N]>,
+    shifts: Shifts<N>,
     arch: Arch,
 }
 
-impl<'a> ByRows<'a> {
+impl<'a, const N: usize> ByRows<'a, N>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     /// Solves all pairs of patches once. `progress` is called with the share done, from any thread.
     ///
     /// # Errors
     /// Too few bins.
     pub fn new(
-        data: &'a Data,
+        data: &'a Data<'a, N>,
         settings: &'a FillSettings,
         progress: &Progress<'_>,
     ) -> Result<Self, FillError> {
@@ -53,7 +57,7 @@ impl<'a> ByRows<'a> {
     pub fn each_row<E: Send>(
         &self,
         progress: &Progress<'_>,
-        take: &(impl Fn(usize, [&[f32]; 3]) -> Result<(), E> + Sync),
+        take: &(impl Fn(usize, [&[f32]; N]) -> Result<(), E> + Sync),
         cancelled: impl Fn() -> E + Sync,
     ) -> Result<(), E> {
         let grid = self.task.grid;
@@ -71,7 +75,8 @@ impl<'a> ByRows<'a> {
             .with_max_len(1)
             .try_for_each_init(work, |work, p| {
                 let lights = &patches[p].directions;
-                let mut rows = [(); 3].map(|()| vec![0.0f32; lights.len() * n]);
+                let mut rows: [Vec<f32>; N] =
+                    std::array::from_fn(|_| vec![0.0f32; lights.len() * n]);
                 for q in 0..patches.len() {
                     self.write_pair(work, p, q, &mut rows);
                 }
@@ -96,7 +101,7 @@ impl<'a> ByRows<'a> {
     }
 
     /// Writes the cells of lights in patch `p` and views in patch `q`.
-    fn write_pair(&self, work: &mut Work, p: usize, q: usize, rows: &mut [Vec<f32>; 3]) {
+    fn write_pair(&self, work: &mut Work<N>, p: usize, q: usize, rows: &mut [Vec<f32>; N]) {
         let patches = &self.task.cover.patches;
         let (settings, n) = (self.task.settings, self.task.grid.n_directions());
         let (first, second) = (p.min(q), p.max(q));
@@ -116,7 +121,7 @@ impl<'a> ByRows<'a> {
                 // Within one patch the first order of a pair serves for both, as in memory.
                 let swap = q < p || (p == q && b < a);
                 let place = if swap { b * width + a } else { a * width + b };
-                for c in 0..3 {
+                for c in 0..N {
                     rows[c][a * n + *view as usize] = work.logs[place][c];
                 }
             }

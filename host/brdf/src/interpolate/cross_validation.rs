@@ -5,6 +5,7 @@
 //! number of a frame are grouped by clusters of directions instead.
 
 use super::FillSettings;
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::{Data, MANY_BINS};
 use super::patches::{Patch, cover};
 use super::refine::Refiner;
@@ -26,66 +27,66 @@ const MATES: usize = 64;
 const FOLDS: u32 = 4;
 
 /// All bins, divided into those that predict and those that are predicted.
-pub struct Fold<'a> {
-    bins: &'a Bins,
+pub struct Fold<'a, const N: usize = 3> {
+    bins: &'a Bins<N>,
     /// Of each bin, whether it takes part in the prediction.
     training: Vec<bool>,
     /// All that are left out.
-    left_out: Vec<&'a Bin>,
+    left_out: Vec<&'a Bin<N>>,
     /// Whether frames are the groups, not clusters.
     framed: bool,
     /// Bins that are to be predicted, each with the number of left-out bins it stands for.
-    tests: Vec<(&'a Bin, f32)>,
+    tests: Vec<(&'a Bin<N>, f32)>,
 }
 
 /// A bin that was left out, and what the others predict of it.
 #[derive(Clone, Copy, Debug)]
-pub struct Prediction<'a> {
+pub struct Prediction<'a, const N: usize = 3> {
     /// The bin.
-    pub bin: &'a Bin,
+    pub bin: &'a Bin<N>,
     /// How many left-out bins it stands for.
     pub weight: f32,
     /// Natural logarithm of the value predicted, per channel.
-    pub log: [f32; 3],
+    pub log: [f32; N],
     /// Logarithm of predicted over measured, of channels that can have one.
-    pub residual: [Option<f32>; 3],
+    pub residual: [Option<f32>; N],
     /// Variance of the prediction as the data around show it, per channel, not calibrated.
-    pub variance: [f32; 3],
+    pub variance: [f32; N],
 }
 
 /// What the others predict of the left-out bins of one frame (or cluster) in one block. Their mean shows
 /// errors that noise hides in each of them.
 #[derive(Clone, Debug)]
-pub struct MeanPrediction<'a> {
+pub struct MeanPrediction<'a, const N: usize = 3> {
     /// One of them.
-    pub first: Prediction<'a>,
+    pub first: Prediction<'a, N>,
     /// All of them.
-    pub bins: Vec<&'a Bin>,
+    pub bins: Vec<&'a Bin<N>>,
     /// Mean logarithm of predicted over measured, of channels that can have one.
-    pub residual: [Option<f32>; 3],
+    pub residual: [Option<f32>; N],
     /// Variance of the mean of the predictions, per channel, not calibrated.
-    pub variance: [f32; 3],
+    pub variance: [f32; N],
 }
 
-impl<'a> Fold<'a> {
+impl<'a, const N: usize> Fold<'a, N> {
     /// Leaves out one frame (or cluster) in `one_in`, those of fold `number`, and tests about `tests` of
     /// their bins: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
-    pub fn new(all: &'a Bins, number: u32, one_in: u32, tests: usize) -> Option<Self> {
+    pub fn new(all: &'a Bins<N>, number: u32, one_in: u32, tests: usize) -> Option<Self> {
         let bins = all.bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
-        let is_left_out = |bin: &Bin| {
+        let is_left_out = |bin: &Bin<N>| {
             hash(group_of(bin, framed))
                 .wrapping_add(number)
                 .is_multiple_of(one_in)
         };
         // Bins of several frames may hold a part of a left-out frame, so none of them takes part.
-        let takes_part = |bin: &Bin| !framed || bin.frame != Sample::NO_FRAME;
+        let takes_part = |bin: &Bin<N>| !framed || bin.frame != Sample::NO_FRAME;
         let training: Vec<bool> = bins
             .iter()
             .map(|bin| takes_part(bin) && !is_left_out(bin))
             .collect();
-        let left_out: Vec<&Bin> = bins
+        let left_out: Vec<&Bin<N>> = bins
             .iter()
             .filter(|bin| takes_part(bin) && is_left_out(bin))
             .collect();
@@ -101,7 +102,7 @@ impl<'a> Fold<'a> {
     }
 
     /// How many folds to take.
-    pub fn usual_number(bins: &Bins) -> u32 {
+    pub fn usual_number(bins: &Bins<N>) -> u32 {
         if bins.bins().len() < MANY_BINS {
             FOLDS
         } else {
@@ -111,23 +112,33 @@ impl<'a> Fold<'a> {
 
     /// Predicts the tests, by the very blocks that a fill of these data (of the same bins) with these
     /// settings would use.
-    pub fn predict(&self, data: &Data, settings: &FillSettings) -> Vec<Prediction<'a>> {
+    pub fn predict(&self, data: &Data<N>, settings: &FillSettings) -> Vec<Prediction<'a, N>>
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
         let means = self.predict_among(data, settings, |_| &[]);
         means.into_iter().map(|mean| mean.first).collect()
     }
 
     /// Predicts the tests together with the other left-out bins of their frames (or clusters) in the same block.
-    pub fn predict_means(&self, data: &Data, settings: &FillSettings) -> Vec<MeanPrediction<'a>> {
+    pub fn predict_means(
+        &self,
+        data: &Data<N>,
+        settings: &FillSettings,
+    ) -> Vec<MeanPrediction<'a, N>>
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
         let grid = self.bins.grid();
         let patches = cover(grid, &settings.patch_sizes_deg()).patches;
         let patch_of = patch_of_direction(grid, &patches);
-        let key = |bin: &Bin| {
+        let key = |bin: &Bin<N>| {
             let (light, view) = grid.light_and_view(bin.cell as usize);
             (group_of(bin, self.framed), patch_of[light], patch_of[view])
         };
         let mut sorted: Vec<_> = self.left_out.iter().map(|bin| (key(bin), *bin)).collect();
         sorted.sort_by_key(|(key, bin)| (*key, bin.cell));
-        let (keys, bins): (Vec<_>, Vec<&Bin>) = sorted.into_iter().unzip();
+        let (keys, bins): (Vec<_>, Vec<&Bin<N>>) = sorted.into_iter().unzip();
         self.predict_among(data, settings, |bin| {
             let key = key(bin);
             let from = keys.partition_point(|k| *k < key);
@@ -138,17 +149,18 @@ impl<'a> Fold<'a> {
 
     fn predict_among<'b>(
         &self,
-        data: &Data,
+        data: &Data<N>,
         settings: &FillSettings,
-        mates: impl Fn(&Bin) -> &'b [&'a Bin] + Sync,
-    ) -> Vec<MeanPrediction<'a>>
+        mates: impl Fn(&Bin<N>) -> &'b [&'a Bin<N>] + Sync,
+    ) -> Vec<MeanPrediction<'a, N>>
     where
         'a: 'b,
+        dyn AnyKernel: NewBlock<N>,
     {
         let bins = self.bins;
         let grid = bins.grid();
-        let residual = |bin: &Bin, log: [f32; 3]| {
-            [0, 1, 2].map(|c| {
+        let residual = |bin: &Bin<N>, log: [f32; N]| {
+            std::array::from_fn(|c| {
                 let measured = bins.log_value(bin, c, f32::MIN_POSITIVE);
                 (bin.median[c] > 0.0).then(|| log[c] - measured)
             })
@@ -182,13 +194,13 @@ impl<'a> Fold<'a> {
                         variance: predicted.variance,
                     },
                     bins: members.iter().map(|m| m.bin).collect(),
-                    residual: [Some(0.0); 3],
+                    residual: [Some(0.0); N],
                     variance: predicted.variance_of_mean,
                 };
                 let share = 1.0 / members.len() as f32;
                 for (member, log) in members.iter().zip(predicted.logs) {
                     let own = residual(member.bin, *log);
-                    for c in 0..3 {
+                    for c in 0..N {
                         mean.residual[c] = mean.residual[c].zip(own[c]).map(|(m, r)| m + share * r);
                     }
                 }
@@ -199,32 +211,32 @@ impl<'a> Fold<'a> {
 }
 
 /// A bin and its place.
-struct Member<'a> {
-    bin: &'a Bin,
+struct Member<'a, const N: usize> {
+    bin: &'a Bin<N>,
     place: (Vec3, Vec3),
 }
 
-impl<'a> Member<'a> {
-    fn of(bin: &'a Bin) -> Self {
+impl<'a, const N: usize> Member<'a, N> {
+    fn of(bin: &'a Bin<N>) -> Self {
         let place = (bin.light.map(f64::from), bin.view.map(f64::from));
         Self { bin, place }
     }
 }
 
-impl AsRef<(Vec3, Vec3)> for Member<'_> {
+impl<const N: usize> AsRef<(Vec3, Vec3)> for Member<'_, N> {
     fn as_ref(&self) -> &(Vec3, Vec3) {
         &self.place
     }
 }
 
 /// Number of the frame or the cluster that a bin belongs to.
-fn group_of(bin: &Bin, framed: bool) -> u32 {
+fn group_of<const N: usize>(bin: &Bin<N>, framed: bool) -> u32 {
     if framed { bin.frame } else { cluster(bin) }
 }
 
 /// Picks about `n` bins, half of them among the brightest tenth.
-fn pick(mut bins: Vec<&Bin>, n: usize) -> Vec<(&Bin, f32)> {
-    let brightness = |bin: &Bin| bin.median.iter().sum::<f32>();
+fn pick<const N: usize>(mut bins: Vec<&Bin<N>>, n: usize) -> Vec<(&Bin<N>, f32)> {
+    let brightness = |bin: &Bin<N>| bin.median.iter().sum::<f32>();
     let bright = bins.len() / 10;
     if bright > 0 {
         bins.select_nth_unstable_by(bright, |a, b| {
@@ -254,7 +266,7 @@ fn patch_of_direction(grid: Grid, patches: &[Patch]) -> Vec<usize> {
 }
 
 /// The cluster of directions that a bin belongs to.
-fn cluster(bin: &Bin) -> u32 {
+fn cluster<const N: usize>(bin: &Bin<N>) -> u32 {
     let part = |v: [f32; 3]| {
         let d = Direction::from_vec3(v.map(f64::from));
         let ring = (d.theta_deg() / CLUSTER_DEG).round();

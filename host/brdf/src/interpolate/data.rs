@@ -16,9 +16,9 @@ pub(super) const SORTED_IN: Coordinates = Coordinates {
 };
 
 /// Bins, and their data in order.
-pub struct Data<'a> {
-    bins: &'a Bins,
-    hierarchy: Hierarchy,
+pub struct Data<'a, const N: usize = 3> {
+    bins: &'a Bins<N>,
+    hierarchy: Hierarchy<N>,
     coordinates: Coordinates,
     one_bin_in: usize,
 }
@@ -26,20 +26,20 @@ pub struct Data<'a> {
 /// Fewer bins than this are few.
 pub(super) const MANY_BINS: usize = 1_000_000;
 
-impl<'a> Data<'a> {
+impl<'a, const N: usize> Data<'a, N> {
     /// Sorts the bins' data.
-    pub fn new(bins: &'a Bins) -> Self {
+    pub fn new(bins: &'a Bins<N>) -> Self {
         Self::thinned(bins, 1)
     }
 
     /// Sorts the data of one bin in so many, where there are many: neighbours on the sheet of one frame
     /// differ little, and sorting them all takes longer than a quick fill.
-    pub fn thinned(bins: &'a Bins, one_in: usize) -> Self {
+    pub fn thinned(bins: &'a Bins<N>, one_in: usize) -> Self {
         let many = bins.bins().len() >= MANY_BINS;
         Self::sorted_in(bins, if many { one_in } else { 1 }, SORTED_IN)
     }
 
-    fn sorted_in(bins: &'a Bins, one_in: usize, coordinates: Coordinates) -> Self {
+    fn sorted_in(bins: &'a Bins<N>, one_in: usize, coordinates: Coordinates) -> Self {
         let data = half_of_data(bins, one_in, coordinates);
         Self {
             bins,
@@ -56,7 +56,7 @@ impl<'a> Data<'a> {
     }
 
     /// The bins.
-    pub fn bins(&self) -> &'a Bins {
+    pub fn bins(&self) -> &'a Bins<N> {
         self.bins
     }
 
@@ -66,22 +66,26 @@ impl<'a> Data<'a> {
     }
 
     /// The data as they were sorted.
-    pub fn hierarchy(&self) -> &Hierarchy {
+    pub fn hierarchy(&self) -> &Hierarchy<N> {
         &self.hierarchy
     }
 
     /// The data in other coordinates than those they were sorted in; `None` where these are the same.
-    pub fn moved(&self, coordinates: Coordinates) -> Option<Hierarchy> {
+    pub fn moved(&self, coordinates: Coordinates) -> Option<Hierarchy<N>> {
         if let Some(sorted) = self.sorted_for(coordinates) {
             return Some(sorted.hierarchy);
         }
-        let place = |datum: &Datum| self.coordinates.convert(&datum.point, coordinates);
+        let place = |datum: &Datum<N>| self.coordinates.convert(&datum.point, coordinates);
         (coordinates != self.coordinates).then(|| self.hierarchy.moved(place))
     }
 
     /// The data of those bins that `keep` keeps (by their number), in some coordinates. Nothing is
     /// copied: this is for a few thousand places, where [`Self::moved`] is for all.
-    pub fn subset<K: Fn(usize) -> bool>(&self, coordinates: Coordinates, keep: K) -> Subset<'_, K> {
+    pub fn subset<K: Fn(usize) -> bool>(
+        &self,
+        coordinates: Coordinates,
+        keep: K,
+    ) -> Subset<'_, K, N> {
         // Groups are found by their middles, which need not be exact.
         let middles = self.hierarchy.middles().iter();
         let middles: Vec<Point> = middles
@@ -98,16 +102,16 @@ impl<'a> Data<'a> {
 }
 
 /// See [`Data::subset`].
-pub struct Subset<'a, K> {
-    hierarchy: &'a Hierarchy,
+pub struct Subset<'a, K, const N: usize = 3> {
+    hierarchy: &'a Hierarchy<N>,
     sorted_in: Coordinates,
     coordinates: Coordinates,
     tree: Option<ImmutableKdTree<f32, 6>>,
     keep: K,
 }
 
-impl<K: Fn(usize) -> bool> Subset<'_, K> {
-    fn place(&self, datum: &Datum) -> Point {
+impl<K: Fn(usize) -> bool, const N: usize> Subset<'_, K, N> {
+    fn place(&self, datum: &Datum<N>) -> Point {
         self.sorted_in.convert(&datum.point, self.coordinates)
     }
 
@@ -118,17 +122,17 @@ impl<K: Fn(usize) -> bool> Subset<'_, K> {
     }
 
     /// A merged datum without the bins that are left out; `None` when none are left.
-    fn merged(&self, number: usize) -> Option<Datum> {
+    fn merged(&self, number: usize) -> Option<Datum<N>> {
         let data = self.hierarchy.bins()[self.hierarchy.bins_of(number)].iter();
         let kept = data.filter(|datum| (self.keep)(datum.bin()));
         merge(kept.map(|datum| (self.place(datum), datum)))
     }
 }
 
-impl<K: Fn(usize) -> bool> Neighbours for Subset<'_, K> {
+impl<K: Fn(usize) -> bool, const N: usize> Neighbours<N> for Subset<'_, K, N> {
     fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>) {
         found.clear();
-        let (Some(tree), Some(groups)) = (&self.tree, NonZero::new(Hierarchy::groups_for(n)))
+        let (Some(tree), Some(groups)) = (&self.tree, NonZero::new(Hierarchy::<N>::groups_for(n)))
         else {
             return;
         };
@@ -156,7 +160,7 @@ impl<K: Fn(usize) -> bool> Neighbours for Subset<'_, K> {
         }
     }
 
-    fn datum(&self, detail: Detail, number: u32) -> Datum {
+    fn datum(&self, detail: Detail, number: u32) -> Datum<N> {
         let stored = self.hierarchy.datum(detail, number);
         match detail {
             Detail::Merged => self.merged(number as usize).unwrap_or(stored),

@@ -8,11 +8,11 @@ use rayon::prelude::*;
 
 /// One value and its place.
 #[derive(Clone, Copy, Debug)]
-pub struct Datum {
+pub struct Datum<const N: usize = 3> {
     /// Place.
     pub point: Point,
     /// Natural logarithm of the bin's value, per channel: see [`Bins::log_value`].
-    pub log_value: [f32; 3],
+    pub log_value: [f32; N],
     /// Number of samples behind it; less for an outlier.
     pub count: f32,
     /// Twice the number of the bin it came from, and one more where light and view are exchanged;
@@ -20,7 +20,7 @@ pub struct Datum {
     pub source: u32,
 }
 
-impl Datum {
+impl<const N: usize> Datum<N> {
     /// Number of the bin that the datum came from.
     pub fn bin(&self) -> usize {
         (self.source / 2) as usize
@@ -44,7 +44,11 @@ const FLOOR_SHARE: f32 = 1e-4;
 /// The datum of one bin in so many, numbered as all bins come: the bin's own or its mirror image (light and
 /// view exchanged), whichever has the difference of light and view that points to positive x. The others
 /// are the mirror images of these.
-pub fn half_of_data(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec<Datum> {
+pub fn half_of_data<const N: usize>(
+    bins: &Bins<N>,
+    one_in: usize,
+    coordinates: Coordinates,
+) -> Vec<Datum<N>> {
     let floor = floor_of(bins.bins().iter());
     (0..bins.bins().len())
         .into_par_iter()
@@ -53,7 +57,7 @@ pub fn half_of_data(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec
             let bin = &bins.bins()[number];
             let datum = Datum {
                 point: coordinates.point(bin.light.map(f64::from), bin.view.map(f64::from)),
-                log_value: [0, 1, 2].map(|c| bins.log_value(bin, c, floor[c])),
+                log_value: std::array::from_fn(|c| bins.log_value(bin, c, floor[c])),
                 count: bin.count as f32,
                 source: 2 * number as u32,
             };
@@ -67,15 +71,17 @@ pub fn half_of_data(bins: &Bins, one_in: usize, coordinates: Coordinates) -> Vec
 }
 
 /// The mean of data at given places, weighted by count; `None` of none.
-pub(super) fn merge<'a>(data: impl Iterator<Item = (Point, &'a Datum)>) -> Option<Datum> {
+pub(super) fn merge<'a, const N: usize>(
+    data: impl Iterator<Item = (Point, &'a Datum<N>)>,
+) -> Option<Datum<N>> {
     let mut point = [0.0; 6];
-    let mut log_value = [0.0; 3];
+    let mut log_value = [0.0f32; N];
     let mut count = 0.0;
     for (place, datum) in data {
         for k in 0..6 {
             point[k] += datum.count * place[k];
         }
-        for c in 0..3 {
+        for c in 0..N {
             log_value[c] += datum.count * datum.log_value[c];
         }
         count += datum.count;
@@ -89,8 +95,10 @@ pub(super) fn merge<'a>(data: impl Iterator<Item = (Point, &'a Datum)>) -> Optio
 }
 
 /// The smallest value per channel that takes part.
-pub(crate) fn floor_of<'a>(bins: impl Iterator<Item = &'a Bin> + Clone) -> [f32; 3] {
-    [0, 1, 2].map(|c| {
+pub(crate) fn floor_of<'a, const N: usize>(
+    bins: impl Iterator<Item = &'a Bin<N>> + Clone,
+) -> [f32; N] {
+    std::array::from_fn(|c| {
         // The median brightness of a few thousand bins is good enough for a floor.
         let total = bins.clone().count().max(1);
         let mut values: Vec<f32> = bins

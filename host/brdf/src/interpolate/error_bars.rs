@@ -9,6 +9,7 @@
 //! bins' own noise included. Where that noise hides the error even so, the block's own variance stands.
 
 use super::FillSettings;
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::cross_validation::{Fold, MeanPrediction, Prediction};
 use super::data::Data;
 use super::datum::SIGMA_PER_MAD;
@@ -47,21 +48,21 @@ const NOISE_ALONE: f32 = 0.1;
 
 /// Standard errors of a dense BRDF.
 #[derive(Clone, Debug)]
-pub struct ErrorBars {
+pub struct ErrorBars<const N: usize = 3> {
     /// Standard error per channel, in the unit of the values, cell by cell.
-    pub standard_error: [Vec<f32>; 3],
+    pub standard_error: [Vec<f32>; N],
     /// An [`Origin`](super::Origin) a cell.
     pub origin: Vec<u8>,
 }
 
-impl ErrorBars {
+impl<const N: usize> ErrorBars<N> {
     /// Standard errors as shares of the values they belong to, mean over the channels, cell by cell.
-    pub fn relative(&self, values: &DenseBrdf) -> Vec<f32> {
+    pub fn relative(&self, values: &DenseBrdf<N>) -> Vec<f32> {
         let planes = values.planes();
         (0..self.origin.len())
             .map(|cell| {
                 let of_channel = |c: usize| self.standard_error[c][cell] / planes[c][cell];
-                (0..3).map(of_channel).sum::<f32>() / 3.0
+                (0..N).map(of_channel).sum::<f32>() / N as f32
             })
             .collect()
     }
@@ -97,7 +98,10 @@ struct Classes {
 impl Calibration {
     /// Calibrates by cross-validation. `None` when there are too few frames (or clusters of directions)
     /// for a fold.
-    pub fn new(data: &Data, settings: &FillSettings) -> Option<Self> {
+    pub fn new<const N: usize>(data: &Data<N>, settings: &FillSettings) -> Option<Self>
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
         let bins = data.bins();
         let sorted = data.sorted_for(settings.coordinates);
         let data = sorted.as_ref().unwrap_or(data);
@@ -114,55 +118,58 @@ impl Calibration {
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.
-    fn from_means(means: &[MeanPrediction], noise_variance: f32) -> Self {
+    fn from_means<const N: usize>(means: &[MeanPrediction<N>], noise_variance: f32) -> Self {
         let mut logs: Vec<f32> = means.iter().map(|m| mean(m.first.log)).collect();
         logs.sort_by(f32::total_cmp);
         // The brightest tenth of all is about half of the bins that a fold tests.
         let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
         let noise = BinNoise::new(means, noise_variance);
         let mut calibration = Self {
-            parts: [(); 4].map(|()| Classes::new(&[], &noise)),
+            parts: [(); 4].map(|()| Classes::new::<N>(&[], &noise)),
             bright,
             noise,
         };
-        let all: Vec<&MeanPrediction> = means.iter().collect();
+        let all: Vec<&MeanPrediction<N>> = means.iter().collect();
         for part in 0..4 {
-            let of_part = |m: &&MeanPrediction| {
+            let of_part = |m: &&MeanPrediction<N>| {
                 let bin = m.first.bin;
                 let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
                 calibration.part(light, view, m.first.log) == part
             };
-            let own: Vec<&MeanPrediction> = all.iter().copied().filter(of_part).collect();
+            let own: Vec<&MeanPrediction<N>> = all.iter().copied().filter(of_part).collect();
             let enough = own.len() >= CLASS_MIN;
             calibration.parts[part] = Classes::new(if enough { &own } else { &all }, &noise);
         }
         calibration
     }
 
-    fn part(&self, light: Vec3, view: Vec3, log: [f32; 3]) -> usize {
+    fn part<const N: usize>(&self, light: Vec3, view: Vec3, log: [f32; N]) -> usize {
         let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
         2 * usize::from(grazing) + usize::from(mean(log) > self.bright)
     }
 
     /// Standard error of the logarithm, per channel, from a block's logarithm and its variance.
-    pub fn standard_error(
+    pub fn standard_error<const N: usize>(
         &self,
         light: Vec3,
         view: Vec3,
-        log: [f32; 3],
-        variance: [f32; 3],
-    ) -> [f32; 3] {
+        log: [f32; N],
+        variance: [f32; N],
+    ) -> [f32; N] {
         let factor = self.parts[self.part(light, view, log)].factor(size(variance));
         variance.map(|v| factor * v.max(0.0).sqrt())
     }
 
     /// Whether a left-out bin lies within the 95 % interval of its prediction, the noise of its own
     /// samples included; of the channels that have a residual.
-    pub fn covers<'a>(&'a self, prediction: &'a Prediction) -> impl Iterator<Item = bool> + 'a {
+    pub fn covers<'a, const N: usize>(
+        &'a self,
+        prediction: &'a Prediction<'a, N>,
+    ) -> impl Iterator<Item = bool> + 'a {
         let bin = prediction.bin;
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
         let error = self.standard_error(light, view, prediction.log, prediction.variance);
-        (0..3).filter_map(move |c| {
+        (0..N).filter_map(move |c| {
             let residual = prediction.residual[c]?;
             let noise = self.noise.of(bin, c);
             Some(residual.powi(2) <= Z95 * Z95 * (error[c] * error[c] + noise))
@@ -172,7 +179,7 @@ impl Calibration {
 
 impl BinNoise {
     /// Finds the factor on bins that show noise alone; without enough of them it is 1.
-    fn new(means: &[MeanPrediction], variance: f32) -> Self {
+    fn new<const N: usize>(means: &[MeanPrediction<N>], variance: f32) -> Self {
         let stated = Self {
             variance,
             factor: 1.0,
@@ -181,7 +188,7 @@ impl BinNoise {
             .iter()
             .flat_map(|m| {
                 let p = m.first;
-                (0..3).filter_map(move |c| {
+                (0..N).filter_map(move |c| {
                     Residual::new(p.residual[c], p.variance[c], stated.of(p.bin, c))
                 })
             })
@@ -189,7 +196,7 @@ impl BinNoise {
             .filter(|(noise, error, _)| *error < NOISE_ALONE * noise)
             .map(|(noise, error, limit)| (limit - error) / noise)
             .collect();
-        let enough = factors.len() >= 3 * CLASS_MIN;
+        let enough = factors.len() >= N * CLASS_MIN;
         let factor = enough.then(|| quantile(&mut factors, 0.95)).flatten();
         Self {
             factor: factor.unwrap_or(1.0).clamp(0.5, 2.0),
@@ -199,7 +206,7 @@ impl BinNoise {
 
     /// Variance of the logarithm of a bin's median about the true value at the mean direction, of one
     /// channel.
-    fn of(&self, bin: &Bin, channel: usize) -> f32 {
+    fn of<const N: usize>(&self, bin: &Bin<N>, channel: usize) -> f32 {
         let of_median = variance_of_median(bin.count);
         let spread = SIGMA_PER_MAD * bin.mad[channel] / bin.median[channel].abs();
         // What the samples scatter by beyond the noise, they do by their places: the mean of these is the
@@ -231,12 +238,12 @@ impl Residual {
     }
 
     /// Those of the channels of a mean.
-    fn of_mean<'a>(
-        mean: &'a MeanPrediction,
+    fn of_mean<'a, const N: usize>(
+        mean: &'a MeanPrediction<'a, N>,
         noise: &'a BinNoise,
     ) -> impl Iterator<Item = Self> + 'a {
         let count = mean.bins.len() as f32;
-        (0..3).filter_map(move |c| {
+        (0..N).filter_map(move |c| {
             let sum: f32 = mean.bins.iter().map(|bin| noise.of(bin, c)).sum();
             Self::new(mean.residual[c], mean.variance[c], sum / (count * count))
         })
@@ -244,9 +251,9 @@ impl Residual {
 }
 
 impl Classes {
-    fn new(means: &[&MeanPrediction], noise: &BinNoise) -> Self {
-        let size = |m: &MeanPrediction| size(m.first.variance);
-        let mut sorted: Vec<&MeanPrediction> = means.to_vec();
+    fn new<const N: usize>(means: &[&MeanPrediction<N>], noise: &BinNoise) -> Self {
+        let size = |m: &MeanPrediction<N>| size(m.first.variance);
+        let mut sorted: Vec<&MeanPrediction<N>> = means.to_vec();
         sorted.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let length = sorted.len().div_ceil(SIZES).max(CLASS_MIN);
         let mut limits = Vec::new();
@@ -289,7 +296,7 @@ impl Classes {
 /// square of the factor that just reaches it, and of these the 95th percentile; then the mean of that
 /// and of the usual one, weighted by their uncertainties. Of residuals that are nearly all noise, the
 /// percentile says nothing.
-fn factor_of(class: &[&MeanPrediction], noise: &BinNoise) -> f32 {
+fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> f32 {
     let all: Vec<Residual> = class
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
@@ -312,10 +319,10 @@ fn factor_of(class: &[&MeanPrediction], noise: &BinNoise) -> f32 {
     (weight * square.max(0.0) + (1.0 - weight) * usual).sqrt()
 }
 
-fn size(variance: [f32; 3]) -> f32 {
+fn size<const N: usize>(variance: [f32; N]) -> f32 {
     variance.iter().map(|v| v.max(0.0)).sum::<f32>().sqrt()
 }
 
-fn mean(log: [f32; 3]) -> f32 {
-    log.iter().sum::<f32>() / 3.0
+fn mean<const N: usize>(log: [f32; N]) -> f32 {
+    log.iter().sum::<f32>() / N as f32
 }

@@ -24,7 +24,7 @@ const TAYLOR: [f32; 8] = [
 
 /// Replaces natural logarithms, one per channel, by what they are the logarithms of, e^−60 ..= e^60;
 /// relative error below 3e-7. The same number gives the same result wherever it stands.
-pub fn exponentials(arch: Arch, logs: &mut [[f32; 3]]) {
+pub fn exponentials<const N: usize>(arch: Arch, logs: &mut [[f32; N]]) {
     arch.dispatch(Exponentials(logs.as_flattened_mut()));
 }
 

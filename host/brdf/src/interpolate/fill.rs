@@ -2,6 +2,7 @@
 
 use super::FillSettings;
 use super::blend::{Corners, Shifts};
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::error_bars::{Calibration, ErrorBars};
 use super::exponential::exponentials;
@@ -37,11 +38,14 @@ pub enum FillError {
 ///
 /// # Errors
 /// Too few bins.
-pub fn fill(
-    data: &Data,
+pub fn fill<const N: usize>(
+    data: &Data<N>,
     settings: &FillSettings,
     progress: &Progress<'_>,
-) -> Result<DenseBrdf, FillError> {
+) -> Result<DenseBrdf<N>, FillError>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     Ok(DenseBrdf::from_planes(
         data.bins().grid(),
         solve(data, settings, None, progress)?.0,
@@ -52,12 +56,15 @@ pub fn fill(
 ///
 /// # Errors
 /// Too few bins.
-pub fn fill_with_errors(
-    data: &Data,
+pub fn fill_with_errors<const N: usize>(
+    data: &Data<N>,
     settings: &FillSettings,
     calibration: &Calibration,
     progress: &Progress<'_>,
-) -> Result<(DenseBrdf, ErrorBars), FillError> {
+) -> Result<(DenseBrdf<N>, ErrorBars<N>), FillError>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     let bins = data.bins();
     let grid = bins.grid();
     let (values, standard_error) = solve(data, settings, Some(calibration), progress)?;
@@ -69,12 +76,15 @@ pub fn fill_with_errors(
 }
 
 /// Values of all cells, and with a calibration their standard errors (else planes of no length).
-fn solve(
-    data: &Data,
+fn solve<const N: usize>(
+    data: &Data<N>,
     settings: &FillSettings,
     calibration: Option<&Calibration>,
     progress: &Progress<'_>,
-) -> Result<(Planes, Planes), FillError> {
+) -> Result<(Planes<N>, Planes<N>), FillError>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     let task = Task::new(data, settings)?;
     let (grid, patches) = (task.grid, &task.cover.patches);
     let values = SharedPlanes::new(grid.n_cells());
@@ -89,7 +99,7 @@ fn solve(
                 .vectors
                 .iter()
                 .flat_map(|light| q.vectors.iter().map(move |view| (*light, *view)));
-            let relative: Vec<[f32; 3]> = directions
+            let relative: Vec<[f32; N]> = directions
                 .zip(solved.cells.iter().zip(solved.variances))
                 .map(|((light, view), (log, variance))| {
                     calibration.standard_error(light, view, *log, *variance)
@@ -114,7 +124,7 @@ fn solve(
                 if calibration.is_some() {
                     errors.load(grid, pair, &mut work.errors);
                     for (error, value) in work.errors.iter_mut().zip(&work.logs) {
-                        *error = [0, 1, 2].map(|c| error[c] * value[c]);
+                        *error = std::array::from_fn(|c| error[c] * value[c]);
                     }
                     errors.store_both(grid, pair, &work.errors);
                 }
@@ -124,16 +134,22 @@ fn solve(
 }
 
 /// What a fill is made of.
-pub(super) struct Task<'a> {
+pub(super) struct Task<'a, const N: usize> {
     pub grid: Grid,
     pub settings: &'a FillSettings,
-    data: &'a Data<'a>,
-    moved: Option<Hierarchy>,
+    data: &'a Data<'a, N>,
+    moved: Option<Hierarchy<N>>,
     pub cover: Cover,
 }
 
-impl<'a> Task<'a> {
-    pub(super) fn new(data: &'a Data, settings: &'a FillSettings) -> Result<Self, FillError> {
+impl<'a, const N: usize> Task<'a, N>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
+    pub(super) fn new(
+        data: &'a Data<'a, N>,
+        settings: &'a FillSettings,
+    ) -> Result<Self, FillError> {
         let bins = data.bins();
         if bins.bins().len() < MIN_BINS {
             return Err(FillError::TooFewBins(bins.bins().len()));
@@ -149,7 +165,7 @@ impl<'a> Task<'a> {
     }
 
     /// The data, in the coordinates of the settings.
-    pub(super) fn hierarchy(&self) -> &Hierarchy {
+    pub(super) fn hierarchy(&self) -> &Hierarchy<N> {
         self.moved.as_ref().unwrap_or(self.data.hierarchy())
     }
 
@@ -161,8 +177,8 @@ impl<'a> Task<'a> {
         &self,
         with_variances: bool,
         progress: &Progress<'_>,
-        each: &(dyn Fn(Solved<'_>, (&Patch, &Patch)) + Sync),
-    ) -> Result<Corners, FillError> {
+        each: &(dyn Fn(Solved<'_, N>, (&Patch, &Patch)) + Sync),
+    ) -> Result<Corners<N>, FillError> {
         let patches = &self.cover.patches;
         let pairs = patches.len() * (patches.len() + 1) / 2;
         let done = AtomicUsize::new(0);
@@ -195,10 +211,10 @@ impl<'a> Task<'a> {
 
 /// Working memory of one thread.
 #[derive(Default)]
-struct Blended {
-    logs: Vec<[f32; 3]>,
-    errors: Vec<[f32; 3]>,
-    shifts: Shifts,
+struct Blended<const N: usize> {
+    logs: Vec<[f32; N]>,
+    errors: Vec<[f32; N]>,
+    shifts: Shifts<N>,
     arch: Arch,
 }
 
@@ -273,6 +289,63 @@ mod tests {
         }
         let rms = (sum / (n * n) as f64).sqrt();
         assert!(rms < 0.03, "log-RMS {rms}");
+    }
+
+    /// Log-RMS over all cells of each channel, where channel c is c + 1 times a mixture of red and blue.
+    fn errors_of_channels<const N: usize>() -> [f64; N]
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
+        let model = Kurt::white_reference_fabric();
+        let mixed = |rgb: [f64; 3]| -> [f64; N] {
+            std::array::from_fn(|c| {
+                let blue = c as f64 / N as f64;
+                (c + 1) as f64 * ((1.0 - blue) * rgb[0] + blue * rgb[2] * rgb[2])
+            })
+        };
+        let of_channels: Vec<Sample<N>> = samples(&model, 20_000)
+            .iter()
+            .map(|s| {
+                let light = Direction::from_deg(s.theta_i_deg.into(), s.phi_i_deg.into());
+                let view = Direction::from_deg(s.theta_v_deg.into(), s.phi_v_deg.into());
+                let value = mixed(model.eval(light.to_vec3(), view.to_vec3()));
+                Sample::new(light, view, value.map(|v| v as f32))
+            })
+            .collect();
+        let grid = Grid::with_step_deg(15.0).unwrap();
+        let bins = Bins::new(grid, &of_channels);
+        let settings = FillSettings {
+            block_deg: 30.0,
+            ..FillSettings::DEFAULT
+        };
+        let dense = fill(&Data::new(&bins), &settings, &silent).unwrap();
+        let n = grid.n_directions();
+        let mut sums = [0.0; N];
+        for light in 0..n {
+            for view in 0..n {
+                let value = dense.at(light, view);
+                assert_eq!(value, dense.at(view, light), "reciprocity");
+                let vectors = [light, view].map(|d| grid.direction(d).to_vec3());
+                let truth = mixed(model.eval(vectors[0], vectors[1]));
+                for c in 0..N {
+                    sums[c] += (f64::from(value[c]) / truth[c]).natural_log().powi(2);
+                }
+            }
+        }
+        sums.map(|sum| (sum / (n * n) as f64).sqrt())
+    }
+
+    #[test]
+    fn channels_of_every_width_are_filled_each_close_to_its_own_truth() {
+        let errors = [
+            errors_of_channels::<1>().to_vec(),
+            errors_of_channels::<3>().to_vec(),
+            errors_of_channels::<31>().to_vec(),
+        ];
+        assert_eq!(errors.each_ref().map(Vec::len), super::super::WIDTHS);
+        for error in errors.concat() {
+            assert!(error < 0.06, "log-RMS {error}");
+        }
     }
 
     #[test]

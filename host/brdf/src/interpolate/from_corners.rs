@@ -22,7 +22,7 @@ pub fn weights_of<'a>(p: &'a Patch, q: &'a Patch) -> Option<(&'a Weights, &'a We
 
 /// Working memory of one thread.
 #[derive(Default)]
-pub struct FromCorners {
+pub struct FromCorners<const N: usize = 3> {
     /// Logarithms at the corners: of one corner of the first patch those of the second and of all
     /// channels, padded.
     values: Vec<f32>,
@@ -33,10 +33,10 @@ pub struct FromCorners {
     arch: Arch,
 }
 
-impl FromCorners {
+impl<const N: usize> FromCorners<N> {
     /// Takes the logarithms at all pairs of corners, corner by corner of the first patch.
-    pub fn load(&mut self, corners: &[[f32; 3]], width: usize) {
-        let padded = (3 * width).next_multiple_of(PAD);
+    pub fn load(&mut self, corners: &[[f32; N]], width: usize) {
+        let padded = (N * width).next_multiple_of(PAD);
         self.values.clear();
         for row in corners.chunks_exact(width) {
             let end = self.values.len() + padded;
@@ -50,11 +50,11 @@ impl FromCorners {
         &mut self,
         (p, q): (&Weights, &Weights),
         (lights, views): (usize, usize),
-        logs: &mut Vec<[f32; 3]>,
+        logs: &mut Vec<[f32; N]>,
     ) {
         logs.clear();
         logs.reserve(lights * views);
-        self.cells.resize(3 * q.width, 0.0);
+        self.cells.resize(N * q.width, 0.0);
         let arch = self.arch;
         arch.dispatch(Write {
             from: self,
@@ -73,7 +73,7 @@ impl FromCorners {
         (p, q): (&Weights, &Weights),
         lights: impl Iterator<Item = usize>,
         views: impl Iterator<Item = usize> + Clone,
-        cells: &[[f32; 3]],
+        cells: &[[f32; N]],
     ) -> f32 {
         let padded = self.values.len() / p.corners();
         let mut cells = cells.iter();
@@ -88,14 +88,14 @@ impl FromCorners {
                 }
             }
             for (view, cell) in views.clone().zip(&mut cells) {
-                let mut sums = [0.0; 3];
-                for (corner, values) in self.row.chunks_exact(3).take(q.corners()).enumerate() {
+                let mut sums = [0.0f32; N];
+                for (corner, values) in self.row.chunks_exact(N).take(q.corners()).enumerate() {
                     let weight = q.at(corner, view);
-                    for c in 0..3 {
+                    for c in 0..N {
                         sums[c] += weight * values[c];
                     }
                 }
-                for c in 0..3 {
+                for c in 0..N {
                     largest = largest.max((sums[c] - cell[c]).abs());
                 }
             }
@@ -104,16 +104,16 @@ impl FromCorners {
     }
 }
 
-struct Write<'a> {
-    from: &'a mut FromCorners,
+struct Write<'a, const N: usize> {
+    from: &'a mut FromCorners<N>,
     p: &'a Weights,
     q: &'a Weights,
     lights: usize,
     views: usize,
-    logs: &'a mut Vec<[f32; 3]>,
+    logs: &'a mut Vec<[f32; N]>,
 }
 
-impl WithSimd for Write<'_> {
+impl<const N: usize> WithSimd for Write<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -136,46 +136,77 @@ impl WithSimd for Write<'_> {
                 }
                 *target = sum;
             }
-            let mut view = 0;
-            while view + 2 * S::F32_LANES <= q.width {
-                row_of_cells::<S, 2>(simd, q, row, view, cells);
-                view += 2 * S::F32_LANES;
+            if N <= FEW {
+                rows_of_cells::<S, N>(simd, q, row, 0, N, cells);
+            } else {
+                let mut first = 0;
+                while first < N {
+                    rows_of_cells::<S, FEW>(simd, q, row, first.min(N - FEW), N, cells);
+                    first += FEW;
+                }
             }
-            while view < q.width {
-                row_of_cells::<S, 1>(simd, q, row, view, cells);
-                view += S::F32_LANES;
+            let mut channels = [&cells[..0]; N];
+            for (channel, cells) in channels.iter_mut().zip(cells.chunks_exact(q.width)) {
+                *channel = &cells[..self.views];
             }
-            let (red, others) = cells.split_at(q.width);
-            let (green, blue) = others.split_at(q.width);
-            for ((r, g), b) in red[..self.views].iter().zip(green).zip(blue) {
-                self.logs.push([*r, *g, *b]);
+            for view in 0..self.views {
+                let mut log = [0.0; N];
+                for c in 0..N {
+                    log[c] = channels[c][view];
+                }
+                self.logs.push(log);
             }
         }
     }
 }
 
-/// `R` vectors of views, in all channels, from the values at the corners of the views.
+/// So many channels' sums stay in registers.
+const FEW: usize = 4;
+
+/// Of all views the channels `first..first + G` of `n`, from the values at the corners of the views.
 #[inline(always)]
-fn row_of_cells<S: Simd, const R: usize>(
+fn rows_of_cells<S: Simd, const G: usize>(
+    simd: S,
+    q: &Weights,
+    row: &[f32],
+    first: usize,
+    n: usize,
+    cells: &mut [f32],
+) {
+    let mut view = 0;
+    while view + 2 * S::F32_LANES <= q.width {
+        row_of_cells::<S, 2, G>(simd, q, row, view, (first, n), cells);
+        view += 2 * S::F32_LANES;
+    }
+    while view < q.width {
+        row_of_cells::<S, 1, G>(simd, q, row, view, (first, n), cells);
+        view += S::F32_LANES;
+    }
+}
+
+/// The same of `R` vectors of views.
+#[inline(always)]
+fn row_of_cells<S: Simd, const R: usize, const G: usize>(
     simd: S,
     q: &Weights,
     row: &[f32],
     view: usize,
+    (first, n): (usize, usize),
     cells: &mut [f32],
 ) {
-    let mut sums = [[simd.splat_f32s(0.0); R]; 3];
+    let mut sums = [[simd.splat_f32s(0.0); R]; G];
     for corner in 0..q.corners() {
         let from = corner * q.width + view;
         let (weights, _) = S::as_simd_f32s(&q.by_corner[from..from + R * S::F32_LANES]);
-        for c in 0..3 {
-            let value = simd.splat_f32s(row[3 * corner + c]);
+        for c in 0..G {
+            let value = simd.splat_f32s(row[n * corner + first + c]);
             for r in 0..R {
                 sums[c][r] = simd.mul_add_e_f32s(weights[r], value, sums[c][r]);
             }
         }
     }
-    for c in 0..3 {
-        let from = c * q.width + view;
+    for c in 0..G {
+        let from = (first + c) * q.width + view;
         let (target, _) = S::as_mut_simd_f32s(&mut cells[from..from + R * S::F32_LANES]);
         target.copy_from_slice(&sums[c]);
     }

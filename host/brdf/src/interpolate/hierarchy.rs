@@ -34,9 +34,9 @@ pub enum Detail {
 }
 
 /// Data in the order of a balanced kd-tree, the data merged of them, and a tree over groups of these.
-pub struct Hierarchy {
-    bins: Vec<Datum>,
-    merged: Vec<Datum>,
+pub struct Hierarchy<const N: usize = 3> {
+    bins: Vec<Datum<N>>,
+    merged: Vec<Datum<N>>,
     /// Where the bins of each merged datum start, and the end of the last.
     starts: Vec<u32>,
     /// Whether the second half of the data are the mirror images of the first, in their order.
@@ -50,7 +50,7 @@ pub struct Hierarchy {
 pub type Found = (f32, u32);
 
 /// What a block can be fitted to: data at two levels of detail, and the nearest of them.
-pub trait Neighbours {
+pub trait Neighbours<const N: usize = 3> {
     /// Writes merged data near a place to `found`, in no order: more than `n`, and with few
     /// exceptions the nearest `n` among them. Fewer when there are not as many.
     fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>);
@@ -59,12 +59,12 @@ pub trait Neighbours {
     fn expand(&self, place: &Point, merged: &[Found], found: &mut Vec<Found>);
 
     /// A datum that was found.
-    fn datum(&self, detail: Detail, number: u32) -> Datum;
+    fn datum(&self, detail: Detail, number: u32) -> Datum<N>;
 }
 
-impl Hierarchy {
+impl<const N: usize> Hierarchy<N> {
     /// Sorts and merges the data.
-    pub fn new(data: Vec<Datum>) -> Self {
+    pub fn new(data: Vec<Datum<N>>) -> Self {
         let (bins, starts) = in_order(data, 1);
         Self::sorted(bins, starts, false)
     }
@@ -72,7 +72,7 @@ impl Hierarchy {
     /// The same of `half` of the data, and the mirror images of all these: half the work. No mirror image
     /// of a datum is to be in the half itself.
     /// Each datum stands for `stands_for` bins, and so fewer are merged.
-    pub fn with_mirror_images(half: Vec<Datum>, stands_for: usize) -> Self {
+    pub fn with_mirror_images(half: Vec<Datum<N>>, stands_for: usize) -> Self {
         let (mut bins, mut starts) = in_order(half, stands_for);
         let n = bins.len();
         append_mirror_images(&mut bins);
@@ -85,7 +85,7 @@ impl Hierarchy {
 
     /// The same data at other places. What is near in one system of coordinates is near in
     /// another: the order is kept, because sorting is what costs most.
-    pub fn moved(&self, place: impl Fn(&Datum) -> Point + Sync) -> Self {
+    pub fn moved(&self, place: impl Fn(&Datum<N>) -> Point + Sync) -> Self {
         let bins = self
             .bins
             .par_iter()
@@ -97,13 +97,13 @@ impl Hierarchy {
         Self::sorted(bins, self.starts.clone(), self.mirrored)
     }
 
-    fn sorted(bins: Vec<Datum>, starts: Vec<u32>, mirrored: bool) -> Self {
+    fn sorted(bins: Vec<Datum<N>>, starts: Vec<u32>, mirrored: bool) -> Self {
         let merging = if mirrored {
             starts.len() / 2
         } else {
             starts.len() - 1
         };
-        let mut merged: Vec<Datum> = starts[..=merging]
+        let mut merged: Vec<Datum<N>> = starts[..=merging]
             .par_windows(2)
             .filter_map(|w| merge(here(&bins[w[0] as usize..w[1] as usize])))
             .collect();
@@ -127,7 +127,7 @@ impl Hierarchy {
     }
 
     /// The data of a level.
-    pub fn data(&self, detail: Detail) -> &[Datum] {
+    pub fn data(&self, detail: Detail) -> &[Datum<N>] {
         match detail {
             Detail::Merged => &self.merged,
             Detail::Bins => &self.bins,
@@ -135,7 +135,7 @@ impl Hierarchy {
     }
 
     /// The bins' own data.
-    pub(super) fn bins(&self) -> &[Datum] {
+    pub(super) fn bins(&self) -> &[Datum<N>] {
         &self.bins
     }
 
@@ -161,7 +161,7 @@ impl Hierarchy {
     }
 }
 
-impl Neighbours for Hierarchy {
+impl<const N: usize> Neighbours<N> for Hierarchy<N> {
     fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>) {
         found.clear();
         let (Some(tree), Some(groups)) = (&self.tree, NonZero::new(Self::groups_for(n))) else {
@@ -187,13 +187,13 @@ impl Neighbours for Hierarchy {
         }
     }
 
-    fn datum(&self, detail: Detail, number: u32) -> Datum {
+    fn datum(&self, detail: Detail, number: u32) -> Datum<N> {
         self.data(detail)[number as usize]
     }
 }
 
 /// Appends the mirror images of data to them.
-fn append_mirror_images(data: &mut Vec<Datum>) {
+fn append_mirror_images<const N: usize>(data: &mut Vec<Datum<N>>) {
     let n = data.len();
     let Some(any) = data.first().copied() else {
         return;
@@ -205,7 +205,7 @@ fn append_mirror_images(data: &mut Vec<Datum>) {
 }
 
 /// Data at their own places.
-fn here(data: &[Datum]) -> impl Iterator<Item = (Point, &Datum)> {
+fn here<const N: usize>(data: &[Datum<N>]) -> impl Iterator<Item = (Point, &Datum<N>)> {
     data.iter().map(|datum| (datum.point, datum))
 }
 
@@ -220,7 +220,10 @@ pub fn keep_nearest(found: &mut Vec<Found>, n: usize) -> f32 {
 
 /// Sorts data so that neighbours follow each other. Also where those that are to be merged start, and the
 /// end of the last.
-fn in_order(mut data: Vec<Datum>, stands_for: usize) -> (Vec<Datum>, Vec<u32>) {
+fn in_order<const N: usize>(
+    mut data: Vec<Datum<N>>,
+    stands_for: usize,
+) -> (Vec<Datum<N>>, Vec<u32>) {
     let merged = (data.len() * stands_for / MERGE).min(data.len());
     let depth = merged.max(1).ilog2();
     split(&mut data, depth);
@@ -232,7 +235,7 @@ fn in_order(mut data: Vec<Datum>, stands_for: usize) -> (Vec<Datum>, Vec<u32>) {
 }
 
 /// Sorts data by halving `depth` times along the widest axis.
-fn split(data: &mut [Datum], depth: u32) {
+fn split<const N: usize>(data: &mut [Datum<N>], depth: u32) {
     if depth == 0 {
         return;
     }
@@ -259,7 +262,7 @@ fn push_starts(from: usize, to: usize, depth: u32, starts: &mut Vec<u32>) {
     push_starts(middle, to, depth - 1, starts);
 }
 
-fn widest_axis(data: &[Datum]) -> usize {
+fn widest_axis<const N: usize>(data: &[Datum<N>]) -> usize {
     let mut low = [f32::INFINITY; 6];
     let mut high = [f32::NEG_INFINITY; 6];
     // A thousand data show the shape of a large set.
@@ -285,7 +288,7 @@ const OUTLIER_WEIGHT: f32 = 0.01;
 
 /// Finds outliers among the data that are merged into one. A median of three samples or more has
 /// dealt with them already, and may well be the only one of its neighbours to see a highlight.
-fn down_weight_outliers(data: &mut [Datum], starts: &[u32]) {
+fn down_weight_outliers<const N: usize>(data: &mut [Datum<N>], starts: &[u32]) {
     let mut rest = data;
     let mut groups = Vec::with_capacity(starts.len());
     for w in starts.windows(2) {
@@ -298,7 +301,11 @@ fn down_weight_outliers(data: &mut [Datum], starts: &[u32]) {
         |(values, deviations), group| {
             // The sum over the channels: colour has no part in what makes an outlier.
             values.clear();
-            values.extend(group.iter().map(|n| n.log_value.iter().sum::<f32>() / 3.0));
+            values.extend(
+                group
+                    .iter()
+                    .map(|n| n.log_value.iter().sum::<f32>() / N as f32),
+            );
             deviations.clone_from(values);
             let middle = median(deviations);
             deviations.clear();
@@ -444,7 +451,7 @@ mod tests {
             few.expand(&[0.0; 6], &near, &mut found);
             assert_eq!(found.len(), n);
         }
-        let none = Hierarchy::new(Vec::new());
+        let none: Hierarchy = Hierarchy::new(Vec::new());
         none.around(&[0.0; 6], 60, &mut near);
         assert!(near.is_empty());
     }

@@ -27,7 +27,7 @@ pub(crate) mod planes;
 pub mod refine;
 pub mod select;
 
-pub use block::kernel::{AnyKernel, Kernel, Matern32};
+pub use block::kernel::{AnyKernel, Kernel, Matern32, NewBlock, WIDTHS};
 pub use by_rows::ByRows;
 pub use coordinates::Coordinates;
 pub use data::Data;

@@ -36,7 +36,7 @@ pub struct OriginCounts {
 
 impl OriginCounts {
     /// Counts what [`origins`] would give, without a visit to every cell.
-    pub fn of(bins: &Bins) -> Self {
+    pub fn of<const N: usize>(bins: &Bins<N>) -> Self {
         let (grid, reach) = (bins.grid(), Reach::new(bins));
         let interpolated = reach.interpolated();
         let all = bins.bins();
@@ -85,7 +85,7 @@ struct Reach {
 const GAP_DEG: f64 = 15.0;
 
 impl Reach {
-    fn new(bins: &Bins) -> Self {
+    fn new<const N: usize>(bins: &Bins<N>) -> Self {
         let grid = bins.grid();
         let n_phi = grid.n_phi();
         let mut rows = vec![0; grid.n_theta()];
@@ -175,7 +175,7 @@ pub struct IsotropicOrigins {
 
 impl IsotropicOrigins {
     /// Of bins; with `sides_alike`, what is measured on one side of the plane of incidence is so on the other.
-    pub fn of(bins: &Bins, sides_alike: bool) -> Self {
+    pub fn of<const N: usize>(bins: &Bins<N>, sides_alike: bool) -> Self {
         let grid = bins.grid();
         let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
         let rows = Reach::new(bins).rows;
@@ -254,7 +254,7 @@ impl IsotropicOrigins {
 }
 
 /// Where each cell's value comes from, as an [`Origin`] a cell.
-pub fn origins(bins: &Bins) -> Vec<u8> {
+pub fn origins<const N: usize>(bins: &Bins<N>) -> Vec<u8> {
     let grid = bins.grid();
     let (reach, n) = (Reach::new(bins), grid.n_directions());
     let mut origins: Vec<u8> = (0..n)

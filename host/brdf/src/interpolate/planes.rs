@@ -1,4 +1,4 @@
-//! Three planes of cells, which many threads write to pair by pair of patches.
+//! Planes of cells, a plane a channel, which many threads write to pair by pair of patches.
 
 use super::patches::Patch;
 use crate::grid::Grid;
@@ -6,20 +6,20 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Values of all cells, a plane a channel.
-pub(super) type Planes = [Vec<f32>; 3];
+pub(super) type Planes<const N: usize> = [Vec<f32>; N];
 
 /// Planes that many threads write to, each cell once. Relaxed atomic stores are plain stores, and
 /// spare an argument about which thread owns which row.
-pub(super) struct SharedPlanes([Vec<AtomicU32>; 3]);
+pub(super) struct SharedPlanes<const N: usize>([Vec<AtomicU32>; N]);
 
-impl SharedPlanes {
+impl<const N: usize> SharedPlanes<N> {
     pub(super) fn new(length: usize) -> Self {
         let plane = || (0..length).into_par_iter().map(|_| AtomicU32::new(0));
-        Self([(); 3].map(|()| plane().collect()))
+        Self(std::array::from_fn(|_| plane().collect()))
     }
 
     /// Stores the cells of a pair, light by light.
-    pub(super) fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
+    pub(super) fn store(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; N]]) {
         let width = q.directions.len();
         for (light, row) in p.directions.iter().zip(cells.chunks_exact(width)) {
             for (first, view, length) in runs(q) {
@@ -30,12 +30,13 @@ impl SharedPlanes {
     }
 
     /// What [`Self::store`] stored.
-    pub(super) fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; 3]>) {
+    pub(super) fn load(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &mut Vec<[f32; N]>) {
         cells.clear();
         for light in &p.directions {
             for (_, view, length) in runs(q) {
                 let from = grid.cell(*light as usize, view);
-                let planes = [0, 1, 2].map(|c| &self.0[c][from..from + length]);
+                let planes: [&[AtomicU32]; N] =
+                    std::array::from_fn(|c| &self.0[c][from..from + length]);
                 cells.extend(
                     (0..length).map(|k| planes.map(|p| f32::from_bits(p[k].load(Relaxed)))),
                 );
@@ -45,7 +46,7 @@ impl SharedPlanes {
 
     /// Stores the cells of a pair and their mirror images. Within one patch both orders of a pair are
     /// there; the first serves for both.
-    pub(super) fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; 3]]) {
+    pub(super) fn store_both(&self, grid: Grid, (p, q): (&Patch, &Patch), cells: &[[f32; N]]) {
         self.store(grid, (p, q), cells);
         let (same, width) = (std::ptr::eq(p, q), q.directions.len());
         for (b, view) in q.directions.iter().enumerate() {
@@ -62,16 +63,17 @@ impl SharedPlanes {
     }
 
     /// Stores cells that follow each other.
-    fn store_run<'a>(&self, from: usize, cells: impl ExactSizeIterator<Item = &'a [f32; 3]>) {
-        let [red, green, blue] = [0, 1, 2].map(|c| &self.0[c][from..from + cells.len()]);
+    fn store_run<'a>(&self, from: usize, cells: impl ExactSizeIterator<Item = &'a [f32; N]>) {
+        let planes: [&[AtomicU32]; N] =
+            std::array::from_fn(|c| &self.0[c][from..from + cells.len()]);
         for (k, cell) in cells.enumerate() {
-            red[k].store(cell[0].to_bits(), Relaxed);
-            green[k].store(cell[1].to_bits(), Relaxed);
-            blue[k].store(cell[2].to_bits(), Relaxed);
+            for c in 0..N {
+                planes[c][k].store(cell[c].to_bits(), Relaxed);
+            }
         }
     }
 
-    pub(super) fn into_planes(self, grid: Grid) -> Planes {
+    pub(super) fn into_planes(self, grid: Grid) -> Planes<N> {
         self.0.map(|plane| {
             // Same size and alignment: the vector is reused in place.
             let mut plane: Vec<f32> = plane

@@ -1,6 +1,7 @@
 //! Which settings suit a material: coordinates by cross-validation, the tolerance by what refinement
 //! may cost.
 
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::budget::affordable_tolerance;
 use super::coordinates::Coordinates;
 use super::cross_validation::{Fold, Prediction};
@@ -42,7 +43,10 @@ pub struct Selection {
 /// Takes the noise that the bins show, then compares the candidate coordinates by cross-validation,
 /// grouped by image (or, without frame numbers, by clusters of directions). With too few of these, `base`
 /// keeps its coordinates. The tolerance is raised where refinement would cost more than the budget.
-pub fn select(data: &Data, base: FillSettings) -> Selection {
+pub fn select<const N: usize>(data: &Data<N>, base: FillSettings) -> Selection
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     let bins = data.bins();
     let mut settings = FillSettings {
         one_bin_in: data.one_bin_in(),
@@ -94,19 +98,22 @@ pub fn select(data: &Data, base: FillSettings) -> Selection {
 }
 
 /// How candidates are compared.
-struct Comparison<'a> {
-    folds: Vec<Fold<'a>>,
+struct Comparison<'a, const N: usize> {
+    folds: Vec<Fold<'a, N>>,
     /// The blocks that predict.
     blocks: FillSettings,
     /// Errors count by this exponent.
     exponent: f64,
 }
 
-impl<'a> Comparison<'a> {
+impl<'a, const N: usize> Comparison<'a, N>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
     /// A few poses see so little of a highlight that a handful of frames would decide by chance, and
     /// squares would be those of a few bins on its slope: there, every frame is left out once and errors
     /// count as they are. The coordinates then matter more than the blocks, so all presets take the same.
-    fn of(bins: &'a Bins, base: FillSettings) -> Self {
+    fn of(bins: &'a Bins<N>, base: FillSettings) -> Self {
         let few = bins.bins().len() < MANY_BINS;
         let (folds, tests) = if few { (ONE_IN, 200) } else { (1, 1200) };
         Self {
@@ -119,7 +126,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// See [`Candidate::log_error`]; `None` without a fold.
-    fn error(&self, data: &Data, settings: &FillSettings) -> Option<f64> {
+    fn error(&self, data: &Data<N>, settings: &FillSettings) -> Option<f64> {
         let sorted = data.sorted_for(settings.coordinates);
         let data = sorted.as_ref().unwrap_or(data);
         let predictions = self
@@ -131,7 +138,7 @@ impl<'a> Comparison<'a> {
             .map(|p| {
                 let residuals = p.residual.iter().flatten();
                 let errors = residuals.map(|r| f64::from(r.abs().min(RESIDUAL_MAX)));
-                errors.map(|e| e.power(self.exponent)).sum::<f64>() / 3.0
+                errors.map(|e| e.power(self.exponent)).sum::<f64>() / N as f64
             })
             .collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
@@ -143,7 +150,7 @@ impl<'a> Comparison<'a> {
 const RESIDUAL_MAX: f32 = 1.0;
 
 /// Whether both polar angles are below [`INTERIOR_DEG`].
-fn is_interior(prediction: &Prediction) -> bool {
+fn is_interior<const N: usize>(prediction: &Prediction<N>) -> bool {
     let lowest = prediction.bin.light[2].min(prediction.bin.view[2]);
     f64::from(lowest) >= INTERIOR_DEG.to_radians().cosine()
 }

@@ -244,6 +244,12 @@ impl ScatteredFit {
         }
     }
 
+    /// The same fit of other channels of these samples.
+    #[must_use]
+    pub fn of_channels(&self, samples: &[Sample]) -> Self {
+        Self::chosen(&Data::new(samples), self.choice.clone())
+    }
+
     /// The settings, and why these.
     pub fn choice(&self) -> &Choice {
         &self.choice

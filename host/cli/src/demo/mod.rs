@@ -1,6 +1,7 @@
 //! `gonia demo`: a whole measurement on the simulated rig. The arms' controllers run the real
 //! firmware core behind the real wire, in virtual time; every frame goes through the real chain.
 
+mod bands;
 mod rig;
 mod session;
 mod summary;
@@ -13,15 +14,18 @@ use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::travelling;
 use gonia_brdf::model::Material;
 use gonia_brdf::{DenseBrdf, Pose};
-use gonia_formats::dense::write_dense;
+use gonia_formats::dense::{write_dense, write_dense_channels};
 use gonia_formats::frames_csv::write_frames_csv;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::write_rig;
-use gonia_formats::samples::write_noted_samples;
+use gonia_formats::samples::{write_noted_channels, write_noted_samples};
 use gonia_formats::{Summary, cell_mask, check_writable, checksum};
 use gonia_pipeline::process::{FrameSource, Masks, Processed};
 use gonia_pipeline::provenance::{Provenance, of_this_program};
-use gonia_pipeline::{FillOptions, Options, Side, Table, calibrate, compare, fill, samples_of};
+use gonia_pipeline::{
+    FillOptions, Options, Side, Table, calibrate, compare, compare_bands, fill, fill_channels,
+    samples_of,
+};
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
 use gonia_report::files::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
@@ -34,6 +38,11 @@ use std::time::Instant;
 
 /// The rig's drawing; `rig.toml` is what the calibration found.
 const NOMINAL: &str = "nominal.toml";
+
+/// Samples of bands, their dense BRDF and the true one.
+const BAND_SAMPLES: &str = "bands.npy";
+const BAND_DENSE: &str = "bands.exr";
+const BAND_TRUTH: &str = "bands-truth.exr";
 
 /// Measures a material of known BRDF, by default a two-thread fabric, on the simulated rig.
 #[derive(clap::Args)]
@@ -60,6 +69,9 @@ pub struct Demo {
     /// A rig without a flaw, of which nothing need be found out: for tests of other things
     #[arg(long)]
     ideal_rig: bool,
+    /// Also measure so many bands from 400 to 700 nm, each a mixture of the camera's channels (31: every 10 nm)
+    #[arg(long, value_name = "N")]
+    bands: Option<usize>,
     /// Seed of all that is random in the simulation
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -78,6 +90,11 @@ impl Demo {
         if !(100..=8192).contains(&frame_px) {
             bail!("--frame-px {frame_px}: must lie in 100..=8192");
         }
+        if let Some(bands) = self.bands
+            && !(1..=301).contains(&bands)
+        {
+            bail!("--bands {bands}: must lie in 1..=301");
+        }
         check_writable(&self.out)?;
         let run = Run {
             material: Material::named(&self.material).context("--material")?,
@@ -90,6 +107,9 @@ impl Demo {
         remarks::print(&measured.processed.remarks);
         let mut rows = measured.rig_rows;
         rows.extend(account::describe(&measured.processed));
+        if let Some(bands) = run.demo.bands {
+            rows.extend(run.measure_bands(bands, step, &measured.processed)?);
+        }
         let (mut summary, dense, cells) = run.fill(step, &measured.session, measured.processed)?;
         run.write_truth(&dense, &mut summary)?;
         run.draw(&dense, &cells, &measured.rig, &mut summary)?;
@@ -247,6 +267,38 @@ impl Run {
         })?;
         summary.dense = Some(checksum::of_brdf(&dense.brdf));
         Ok((summary, dense, measured))
+    }
+
+    /// The samples in bands, their dense BRDF, the true one, and how far these are apart.
+    fn measure_bands(
+        &self,
+        bands: usize,
+        step_deg: f64,
+        processed: &Processed,
+    ) -> Result<Vec<(String, String)>> {
+        let wavelengths = bands::wavelengths(bands);
+        let samples = bands::samples(&processed.samples, &wavelengths);
+        let note = processed.note(self.facts());
+        self.progress.stage("writing samples of bands", |_| {
+            write_noted_channels(&self.path(BAND_SAMPLES), &samples, &note)
+        })?;
+        let options = FillOptions::with_step_deg(step_deg);
+        if !options.channels_fit_memory(&samples.channels)? {
+            let command = format!("gonia fill {BAND_SAMPLES} -o {BAND_DENSE}");
+            return Ok(vec![("bands: to be filled by".to_owned(), command)]);
+        }
+        let filled = fill_channels(samples, processed.scale(), &options, &self.progress.watch())?;
+        remarks::print(&filled.remarks);
+        let mut dense = filled.dense;
+        dense.provenance.extend(self.facts());
+        let truth = bands::truth(dense.grid, self.material.brdf.as_ref(), &wavelengths);
+        self.progress.stage("writing bands", |_| {
+            write_dense_channels(&self.path(BAND_DENSE), &dense)?;
+            write_dense_channels(&self.path(BAND_TRUTH), &truth)
+        })?;
+        let figures = compare_bands(&dense, &truth).map(|figures| figures.to_string());
+        let text = figures.unwrap_or_else(|| "not comparable".to_owned());
+        Ok(vec![(dense.channels.to_string(), text)])
     }
 
     /// Compares the dense BRDF with the material's true one, and writes that too.

@@ -65,10 +65,15 @@ impl Registrar {
     }
 
     /// How a frame in which the lines are not where they should be was turned, when they are once it is
-    /// turned back. A square target straight from above is the same either way.
+    /// turned back. A square target straight from above, or along an axis of its symmetry, is the same either
+    /// way: there nothing is said.
     fn turned(&self, frame: &Frame, view: Direction, predicted: &Homography) -> Option<Turn> {
         let near_px = NEAR_WIDTHS * frame.width as f64 + 4.0;
+        let size_px = [frame.width, frame.height].map(|px| px as f64);
         Turn::ALL.into_iter().find(|turn| {
+            if moves_by_px(*turn, predicted, &self.target, size_px) < near_px {
+                return false;
+            }
             let Some(as_taken) = turn.undo(frame) else {
                 return false;
             };
@@ -146,6 +151,18 @@ impl Registrar {
             })
         })
     }
+}
+
+/// How far a turn moves the corners of the fiducial lines from where any of them is, at most.
+fn moves_by_px(turn: Turn, predicted: &Homography, target: &Target, size_px: [f64; 2]) -> f64 {
+    let mm = target.line_offset_mm;
+    let corners = [[-mm, -mm], [mm, -mm], [mm, mm], [-mm, mm]].map(|at| predicted.apply(at));
+    let to_nearest = |at: [f64; 2]| {
+        let apart = corners.map(|c| (c[0] - at[0]).hypotenuse(c[1] - at[1]));
+        apart.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let turned = corners.map(|corner| to_nearest(turn.seen_at(corner, size_px)));
+    turned.into_iter().fold(0.0, f64::max)
 }
 
 /// Half the distance on the frame between two opposite fiducial lines.

@@ -10,7 +10,7 @@ use crate::calibrate::shading::{
 };
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
-use crate::calibrate::{are_free, covariance_of, priors, started, states};
+use crate::calibrate::{are_free, covariance_of, median, priors, started, states};
 use gonia_rig::{Remark, Rig};
 use nalgebra::DMatrix;
 
@@ -155,7 +155,7 @@ impl Light {
         let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
         let at = CAMERA.len();
         allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
-        let kept = free(&are_free(&states), prior.len());
+        let kept = free(&are_free(&LIGHT, &states), prior.len());
         let solved = solve_light(
             &shading,
             &nominal,
@@ -245,14 +245,14 @@ fn residuals_of(shading: &Shading<'_>, before: &Solved, after: &Solved) -> Vec<S
 }
 
 /// What a reference shows that does not scatter as it is thought to, where its values have a `typical` noise.
-fn unlike(solved: &Solved, typical: f64) -> Option<LightState> {
+pub fn unlike(solved: &Solved, typical: f64) -> Option<LightState> {
     let (level, within) = (solved.own[2], solved.noise * typical);
     let is_unlike = level > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical);
     is_unlike.then_some(LightState::ReferenceUnlike { level, within })
 }
 
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.
-fn nominal(rig: &Rig, level: f64, reference: ReferenceShape) -> Vec<f64> {
+pub fn nominal(rig: &Rig, level: f64, reference: ReferenceShape) -> Vec<f64> {
     let mut nominal = values(&LIGHT, rig);
     nominal.extend(values(target_unknowns(), rig));
     nominal.push(level);
@@ -260,7 +260,7 @@ fn nominal(rig: &Rig, level: f64, reference: ReferenceShape) -> Vec<f64> {
     nominal
 }
 
-fn with_target(rig: &Rig, reference: ReferenceShape) -> Vec<f64> {
+pub fn with_target(rig: &Rig, reference: ReferenceShape) -> Vec<f64> {
     let mut prior = priors(&LIGHT, rig);
     prior.extend(priors(target_unknowns(), rig));
     prior.push(LN_INTENSITY_PRIOR);
@@ -278,7 +278,7 @@ fn free(light: &[bool], count: usize) -> Vec<bool> {
 
 /// `own` are the standard deviations of frames' own numbers, where they are known already; `start` is an
 /// earlier solution.
-fn solve_light(
+pub fn solve_light(
     shading: &Shading<'_>,
     nominal: &[f64],
     prior: &[f64],
@@ -330,9 +330,4 @@ fn joined(
         .view_mut((0, n), (n, l))
         .copy_from(&across.rows(0, l).transpose());
     Ok(joined)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

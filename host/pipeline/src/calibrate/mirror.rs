@@ -163,7 +163,7 @@ impl<'a> MirrorLight<'a> {
         let (was, found) = (&self.nominal[..l], &self.solved.shared[..l]);
         let states = states(found, &own);
         allow_for_kept(&mut covariance, n, &states, was, found);
-        let free = are_free(&states[..PLACE]);
+        let free = are_free(&LIGHT[..PLACE], &states[..PLACE]);
         let priors = (&self.nominal[..], &self.prior[..]);
         let start = started(&self.nominal, &all_free(&free), Some(&self.solved));
         let kept = self.mirrors.solve(priors, &free, &start)?;

@@ -14,6 +14,7 @@
 mod choose;
 mod error;
 mod light;
+mod light_off;
 mod lines;
 mod mirror;
 mod numbers;
@@ -26,9 +27,11 @@ mod unknowns;
 pub use choose::spread_poses;
 pub use error::CalibrateError;
 pub use light::LightState;
+pub(crate) use light_off::{LightOff, light_off};
 pub use mirror::MirrorFit;
 pub use numbers::{Number, NumberState, Spread};
 pub use residuals::{LineResidual, Residuals, ShadingResidual};
+pub(crate) use shading::{ReferenceValue, ShadedFrame};
 
 use crate::process::{FrameRow, FrameSampler, FrameSource, Hidden, Outcome, Role, load};
 use crate::progress::{Cancelled, Progress, Step, step};
@@ -46,11 +49,10 @@ use mirror::{MirrorFrame, MirrorLight};
 use nalgebra::DMatrix;
 use numbers::{allow_for_kept, changes, direction_u, state_of};
 use rayon::prelude::*;
-use shading::ShadedFrame;
 use solve::{Problem, Solved, solve};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use unknowns::{CAMERA, LIGHT, Unknown, values, with_values};
+use unknowns::{CAMERA, LIGHT, Moves, Unknown, values, with_values};
 
 /// Frames in which lines are first looked for from far off, and how many of them must show any.
 const FIRST: usize = 16;
@@ -455,8 +457,16 @@ fn states(
         .collect()
 }
 
-fn are_free(states: &[NumberState]) -> Vec<bool> {
-    states.iter().map(|s| *s == NumberState::Found).collect()
+/// Numbers that the frames do not tell by themselves may still be told with others: held at the rig's values they
+/// would spoil those. They stay about where they were, within what is thought possible. Lens and beam are held:
+/// most rigs have none.
+fn are_free(unknowns: &[Unknown], states: &[NumberState]) -> Vec<bool> {
+    let is_free = |(unknown, state): (&Unknown, &NumberState)| match state {
+        NumberState::Found => true,
+        NumberState::Undetermined => matches!(unknown.moves, Moves::WhenDetermined),
+        NumberState::NotNeeded => false,
+    };
+    unknowns.iter().zip(states).map(is_free).collect()
 }
 
 fn check_views(looked_at: usize, lines: &[LineFrame]) -> Result<(), CalibrateError> {
@@ -544,7 +554,7 @@ fn find_camera(
     let states = states(&CAMERA, rig, &nominal, &prior, &all.shared, &covariance);
     allow_for_kept(&mut covariance, 0, &states, &nominal, &all.shared);
     let own = Own::Found(&all.own);
-    let kept = solve_camera(rig, lines, &are_free(&states), own, Some(&all))?;
+    let kept = solve_camera(rig, lines, &are_free(&CAMERA, &states), own, Some(&all))?;
     Ok(CameraSolution {
         shared: kept.shared[..CAMERA.len()].to_vec(),
         covariance,
@@ -668,4 +678,10 @@ fn table(
             state: states[k],
         })
         .collect()
+}
+
+/// Of at least one value.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

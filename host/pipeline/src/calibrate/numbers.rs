@@ -33,7 +33,7 @@ pub struct Number {
 pub enum NumberState {
     /// The frames determine it.
     Found,
-    /// The frames tell hardly more than was known: it keeps its value.
+    /// The frames tell hardly more of it than was known: it stays about where it was.
     Undetermined,
     /// The frames would tell, and speak for its value as it was.
     NotNeeded,

@@ -142,39 +142,67 @@ pub fn target_unknowns() -> &'static [Unknown] {
     &CAMERA[CAMERA.len() - TARGET..]
 }
 
+/// A value of the reference at a point of the sampling grid.
+pub struct ReferenceValue {
+    /// The point's number in the grid.
+    pub point: usize,
+    /// Where it was read, mm.
+    pub at_mm: [f64; 2],
+    /// The unit vector towards the camera.
+    pub to_camera: Vec3,
+    /// Its radiance, the sum of its channels, over the known reflectance factor's (over 1 of an unknown one).
+    pub radiance: f64,
+}
+
 impl ShadedFrame {
     /// Of a frame of the reference; `None` where hardly anything of it is lit.
     pub fn new(rig: &Rig, grid: &SamplingGrid, frame: &SampledFrame) -> Option<Self> {
         let light = IdealLight::new(rig, frame.reading.light);
         let known = rig.reference.as_ref().map(KnownReference::new);
         let camera = frame.camera_at(&CameraModel::new(rig));
-        let mut points = Vec::new();
-        let mut row: Vec<(usize, f64)> = Vec::new();
-        for (i, (at, point)) in grid.points_mm().iter().zip(&frame.points).enumerate() {
-            let Ok(point) = point else { continue };
-            let at = [0, 1].map(|k| at[k] + f64::from(point.offset_mm[k]));
-            let to_light = light.direction_from(at);
-            let value = f64::from(point.rgb.iter().sum::<f32>());
-            let to_camera = camera.direction_from(at);
+        let values = grid.points_mm().iter().zip(&frame.points).enumerate();
+        let values = values.filter_map(|(i, (at, point))| {
+            let point = point.as_ref().ok()?;
+            let at_mm = [0, 1].map(|k| at[k] + f64::from(point.offset_mm[k]));
+            let to_camera = camera.direction_from(at_mm);
             let factor = match &known {
-                Some(known) => {
-                    let of = known.at(to_light, to_camera);
-                    PI * f64::from(of.iter().sum::<f32>())
-                }
+                Some(known) => PI * sum(known.at(light.direction_from(at_mm), to_camera)),
                 None => 1.0,
             };
-            if to_light[2] > LOWEST_COSINE && value > 0.0 && factor > 0.0 {
-                let ln = (value / factor).natural_log();
-                points.push(ShadedPoint {
-                    at_mm: at,
-                    to_camera,
-                    ln,
-                });
-                row.push((i, ln));
-            }
+            Some(ReferenceValue {
+                point: i,
+                at_mm,
+                to_camera,
+                radiance: sum(point.rgb) / factor,
+            })
+        });
+        Self::of_values(rig, frame.reading.light, values)
+    }
+
+    /// Of a frame's values, in the grid's order; `None` where hardly anything is lit.
+    pub fn of_values(
+        rig: &Rig,
+        reading: Direction,
+        values: impl Iterator<Item = ReferenceValue>,
+    ) -> Option<Self> {
+        let light = IdealLight::new(rig, reading);
+        let is_lit = |value: &ReferenceValue| {
+            light.direction_from(value.at_mm)[2] > LOWEST_COSINE
+                && value.radiance > 0.0
+                && value.radiance.is_finite()
+        };
+        let (mut points, mut row) = (Vec::new(), Vec::new());
+        for value in values.filter(is_lit) {
+            let ln = value.radiance.natural_log();
+            row.push((value.point, ln));
+            points.push(ShadedPoint {
+                at_mm: value.at_mm,
+                to_camera: value.to_camera,
+                ln,
+            });
         }
         (points.len() >= FEWEST_POINTS).then(|| Self {
-            light: frame.reading.light,
+            light: reading,
             noise: noise_of(&row),
             points,
         })
@@ -229,6 +257,10 @@ impl ShadedFrame {
         };
         self.points.iter().map(of_point).collect()
     }
+}
+
+fn sum(rgb: [f32; 3]) -> f64 {
+    f64::from(rgb.iter().sum::<f32>())
 }
 
 /// Noise by the second differences of neighbours in a row of the grid: shading has next to none.

@@ -1,7 +1,7 @@
 //! Whether a dense BRDF reflects more than it receives.
 
 use gonia_brdf::{DenseBrdf, Elementary, Grid};
-use gonia_rig::{Remark, Scale};
+use gonia_rig::{Channels, DenseChannels, Remark, Scale};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::{Mutex, PoisonError};
@@ -16,8 +16,10 @@ pub struct DirectionalAlbedo {
     pub by_polar_angle: Vec<[f64; 3]>,
     /// The highest of all directions of light within what was measured.
     pub highest: f64,
-    /// The channel of the highest: 0 red, 1 green, 2 blue.
+    /// The channel of the highest, by its number …
     pub channel: usize,
+    /// … and by its name.
+    pub channel_name: String,
     /// Where the highest is: polar angle of the light, degrees.
     pub theta_i_deg: f64,
     /// Where the highest is: azimuth of the light, degrees.
@@ -60,6 +62,7 @@ impl DirectionalAlbedo {
             by_polar_angle,
             highest,
             channel,
+            channel_name: ["R", "G", "B"][channel].to_owned(),
             theta_i_deg: light.theta_deg(),
             phi_i_deg: light.phi_deg(),
             step_deg,
@@ -76,9 +79,31 @@ impl DirectionalAlbedo {
             .unwrap_or([0.0; 3])
     }
 
-    /// The channel's letter.
-    pub fn channel_name(&self) -> &'static str {
-        ["R", "G", "B"][self.channel.min(2)]
+    /// Of the channel that reflects most among those of a dense BRDF.
+    pub(crate) fn of_channels(brdf: &DenseChannels, up_to_deg: f64) -> Self {
+        let n = brdf.grid.n_directions();
+        let of_channel = |(channel, plane): (usize, &Vec<f32>)| {
+            let sums = AlbedoRows::new(brdf.grid);
+            plane
+                .par_chunks(n)
+                .enumerate()
+                .for_each(|(light, row)| sums.add(light, [row, &[], &[]]));
+            let albedo = sums.finish(up_to_deg);
+            Self { channel, ..albedo }
+        };
+        let all = brdf.planes.iter().enumerate().map(of_channel);
+        let highest = all.max_by(|a, b| a.highest.total_cmp(&b.highest));
+        let albedo = highest.unwrap_or_else(|| AlbedoRows::new(brdf.grid).finish(up_to_deg));
+        albedo.named(&brdf.channels)
+    }
+
+    /// The same with the name that the channel has among some.
+    pub(crate) fn named(self, channels: &Channels) -> Self {
+        let name = channels.names().get(self.channel).cloned();
+        Self {
+            channel_name: name.unwrap_or_default(),
+            ..self
+        }
     }
 }
 
@@ -171,7 +196,7 @@ pub(crate) fn remark(albedo: &DirectionalAlbedo, scale: Scale) -> Option<Remark>
                 albedo.highest,
                 albedo.theta_i_deg,
                 albedo.phi_i_deg,
-                albedo.channel_name()
+                albedo.channel_name
             ),
             "check the reference's reflectance and a factor of pi or of a cosine in the values, or call them relative",
         )

@@ -13,6 +13,8 @@ use std::fmt;
 /// So many refused frames must agree, and so large a share of all that do not show the target in its place.
 const LEAST_ALIKE: usize = 3;
 const SHARE_ALIKE: f64 = 0.5;
+/// And so large a share of them and those that do: a rig that most frames bear out is what it says.
+const SHARE_OF_ALL: f64 = 0.1;
 /// Two frames agree within this share of how far they are off, and within these: pixels at 1000 pixels'
 /// width, degrees, and a share of the size.
 const ALIKE: f64 = 0.25;
@@ -160,7 +162,13 @@ pub fn refused_alike(rig: &Rig, frames: &[FrameReport]) -> Option<Alike> {
     // The one that most others are like; of equals the first.
     let best = not_there.iter().flatten().map(|off| (*off, agree(*off)));
     let (off, count) = best.reduce(|a, b| if b.1 > a.1 { b } else { a })?;
-    let least = (SHARE_ALIKE * not_there.len() as f64).max(LEAST_ALIKE as f64);
+    let there = frames
+        .iter()
+        .filter(|frame| frame.outcome == Outcome::Locked)
+        .count();
+    let least = (SHARE_ALIKE * not_there.len() as f64)
+        .max(SHARE_OF_ALL * (there + count) as f64)
+        .max(LEAST_ALIKE as f64);
     (count as f64 >= least).then_some(Alike {
         frames: count,
         of: not_there.len(),
@@ -316,6 +324,10 @@ mod tests {
         );
         let many = [missing; 4];
         assert_eq!(alike(&[&many[..], &[rolled(0.7); 3]].concat()), None);
+        // Or few of many that do show it.
+        let there = [report(0, Outcome::Locked, 0.0); 30];
+        assert_eq!(alike(&[&there[..], &[rolled(0.7); 3]].concat()), None);
+        assert!(alike(&[&there[..20], &[rolled(0.7); 3]].concat()).is_some());
     }
 
     #[test]

@@ -2,13 +2,13 @@
 
 use super::distances::{CHAINS, Place, correlations, vectors};
 use super::kernel::Kernel;
-use super::{BlockSettings, COUNT_MIN, PAD, Process, RHS};
+use super::{BlockSettings, COUNT_MIN, PAD, Process};
 use pulp::{Simd, WithSimd};
 
 /// Fits a process to the data that it has loaded.
-pub(super) struct Fit<'a, K> {
+pub(super) struct Fit<'a, K, const N: usize> {
     pub(super) kernel: &'a K,
-    pub(super) process: &'a mut Process,
+    pub(super) process: &'a mut Process<N>,
     pub(super) n: usize,
     pub(super) padded: usize,
     pub(super) settings: &'a BlockSettings,
@@ -16,7 +16,7 @@ pub(super) struct Fit<'a, K> {
     pub(super) nugget: Option<f32>,
 }
 
-impl<K: Kernel> WithSimd for Fit<'_, K> {
+impl<K: Kernel, const N: usize> WithSimd for Fit<'_, K, N> {
     /// The nugget used, or the one that failed.
     type Output = Result<f32, f32>;
 
@@ -24,7 +24,9 @@ impl<K: Kernel> WithSimd for Fit<'_, K> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let (n, padded) = (self.n, self.padded);
         let s = self.process;
-        s.matrix.resize(padded, padded + PAD);
+        // A right-hand side a channel, and the constant's.
+        s.matrix
+            .resize(padded, padded + (N + 1).next_multiple_of(PAD));
         let correlations = s.fill_matrix(self.kernel, simd, n, padded);
         let (variance, noise) = s.variances(n, self.settings);
         // Under the process, the expected variance of n values is σ_f² (1 − mean correlation) +
@@ -48,7 +50,7 @@ impl<K: Kernel> WithSimd for Fit<'_, K> {
     }
 }
 
-impl Process {
+impl<const N: usize> Process<N> {
     /// The kernel matrix, padded by the unit matrix, with the right-hand sides below. Returns the
     /// sum of the correlations of all pairs.
     #[inline(always)]
@@ -95,10 +97,10 @@ impl Process {
                 surplus += share * column[row];
             }
             column[n..].fill(0.0);
-            for c in 0..3 {
+            for c in 0..N {
                 column[padded + c] = self.log_values[c][j];
             }
-            column[padded + 3] = 1.0;
+            column[padded + N] = 1.0;
         }
         for j in n..padded {
             let column = self.matrix.column_mut(j);
@@ -137,7 +139,7 @@ impl Process {
                 sum += f64::from(*value);
                 squares += f64::from(*value) * f64::from(*value);
             }
-            variance += (squares - sum * sum / n as f64).max(0.0) / (3 * (n - 1)) as f64;
+            variance += (squares - sum * sum / n as f64).max(0.0) / (N * (n - 1)) as f64;
         }
         let per_sample: f32 = self.counts[..n].iter().map(|c| 1.0 / c.max(1.0)).sum();
         (
@@ -149,25 +151,26 @@ impl Process {
     /// Mean and weights from the factor and `L⁻¹ b` in the extra rows.
     #[inline(always)]
     fn solve_back<S: Simd>(&mut self, simd: S, n: usize, padded: usize) {
-        let mut with_ones = [0.0f32; RHS];
+        let (mut with_ones, mut of_ones) = ([0.0f32; N], 0.0f32);
         for j in 0..n {
-            let z = &self.matrix.column(j)[padded..padded + RHS];
-            for k in 0..RHS {
-                with_ones[k] += z[3] * z[k];
+            let z = &self.matrix.column(j)[padded..=padded + N];
+            for k in 0..N {
+                with_ones[k] += z[N] * z[k];
             }
+            of_ones += z[N] * z[N];
         }
-        for c in 0..3 {
-            self.mean[c] = with_ones[c] / with_ones[3];
+        for c in 0..N {
+            self.mean[c] = with_ones[c] / of_ones;
         }
         // (y − μ)ᵀ K⁻¹ (y − μ) / n.
-        let mut squares = [0.0f32; 3];
+        let mut squares = [0.0f32; N];
         for j in 0..n {
-            let z = &self.matrix.column(j)[padded..padded + RHS];
-            for c in 0..3 {
-                squares[c] += (z[c] - self.mean[c] * z[3]).powi(2);
+            let z = &self.matrix.column(j)[padded..=padded + N];
+            for c in 0..N {
+                squares[c] += (z[c] - self.mean[c] * z[N]).powi(2);
             }
         }
-        for c in 0..3 {
+        for c in 0..N {
             self.signal[c] = squares[c] / n as f32;
         }
         // Some columns at a time: first what the rows below take from them, which none of them waits for, then
@@ -175,39 +178,39 @@ impl Process {
         let lanes = S::F32_LANES;
         for from in (0..n).step_by(lanes).rev() {
             let to = (from + lanes).min(n);
-            let mut left = [[0.0f32; 3]; PAD];
+            let mut left = [[0.0f32; N]; PAD];
             for j in from..to {
                 let column = self.matrix.column(j);
                 let below = (from + lanes).min(padded);
                 let (l, _) = S::as_simd_f32s(&column[below..padded]);
-                let mut dots = [simd.splat_f32s(0.0); 3];
-                for c in 0..3 {
+                let mut dots = [simd.splat_f32s(0.0); N];
+                for c in 0..N {
                     let (w, _) = S::as_simd_f32s(&self.weights[c][below..padded]);
                     for (a, b) in l.iter().zip(w) {
                         dots[c] = simd.mul_add_e_f32s(*a, *b, dots[c]);
                     }
                 }
-                let z = &column[padded..padded + RHS];
-                for c in 0..3 {
+                let z = &column[padded..=padded + N];
+                for c in 0..N {
                     let dot = simd.reduce_sum_f32s(dots[c]);
-                    left[j - from][c] = z[c] - self.mean[c] * z[3] - dot;
+                    left[j - from][c] = z[c] - self.mean[c] * z[N] - dot;
                 }
             }
             for j in (from..to).rev() {
                 let inverse = 1.0 / self.matrix.column(j)[j];
                 let weights = left[j - from].map(|x| x * inverse);
-                for c in 0..3 {
+                for c in 0..N {
                     self.weights[c][j] = weights[c];
                 }
                 for i in from..j {
                     let l = self.matrix.column(i)[j];
-                    for c in 0..3 {
+                    for c in 0..N {
                         left[i - from][c] -= l * weights[c];
                     }
                 }
             }
         }
-        for c in 0..3 {
+        for c in 0..N {
             let pairs = self.weights[c].iter().zip(&self.drifts);
             self.slopes[c] = self.slope_variance * pairs.map(|(w, t)| w * t).sum::<f32>();
         }

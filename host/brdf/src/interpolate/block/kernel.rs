@@ -67,7 +67,7 @@ pub trait Kernel: Send + Sync + 'static {
     }
 
     /// A block of this kernel: leave it as it is.
-    fn block(&'static self) -> Box<dyn Block>
+    fn block<const N: usize>(&'static self) -> Box<dyn Block<N>>
     where
         Self: Sized,
     {
@@ -75,17 +75,26 @@ pub trait Kernel: Send + Sync + 'static {
     }
 }
 
-/// Any [`Kernel`], as settings hold it.
-pub trait AnyKernel: Kernel {
-    /// A block of this kernel, not fitted to anything yet.
-    fn new_block(&'static self) -> Box<dyn Block>;
+/// Numbers of channels that are interpolated together: more of them share a factorisation, and a sum over the data
+/// is written for each number by itself.
+pub const WIDTHS: [usize; 3] = [1, 3, 31];
+
+/// Makes blocks of so many channels.
+pub trait NewBlock<const N: usize> {
+    /// A block, not fitted to anything yet.
+    fn new_block(&'static self) -> Box<dyn Block<N>>;
 }
 
-impl<K: Kernel> AnyKernel for K {
-    fn new_block(&'static self) -> Box<dyn Block> {
+impl<K: Kernel, const N: usize> NewBlock<N> for K {
+    fn new_block(&'static self) -> Box<dyn Block<N>> {
         self.block()
     }
 }
+
+/// Any [`Kernel`], as settings hold it: it makes blocks of all [`WIDTHS`].
+pub trait AnyKernel: Kernel + NewBlock<1> + NewBlock<3> + NewBlock<31> {}
+
+impl<K: Kernel> AnyKernel for K {}
 
 impl PartialEq for dyn AnyKernel {
     fn eq(&self, other: &Self) -> bool {
@@ -163,7 +172,7 @@ impl Kernel for Matern32 {
 
     /// Not inherited: here it is compiled once, and not again in each crate that uses the default.
     #[inline(never)]
-    fn block(&'static self) -> Box<dyn Block> {
+    fn block<const N: usize>(&'static self) -> Box<dyn Block<N>> {
         Box::new(KrigingBlock::new(self))
     }
 }

@@ -39,40 +39,44 @@ pub struct BlockSettings {
 const PAD: usize = 16;
 /// A datum that counts less than this is as good as absent.
 const COUNT_MIN: f32 = 1e-3;
-/// Right-hand sides: three channels and the constant.
-const RHS: usize = 4;
 const _: () = assert!(PAD.is_multiple_of(PANEL));
 
 /// A block of any kernel, which is fitted and then evaluated; it is used again for one neighbourhood
 /// after the other.
-pub trait Block: Send {
+pub trait Block<const N: usize = 3>: Send {
     /// Fits the process to data that lie within `radius` of `middle`: the radius that the range is
     /// measured in. Returns the nugget that was used.
     ///
     /// With fewer than two data the mean is all there is.
-    fn fit(&mut self, data: &[Datum], middle: Point, radius: f32, settings: &BlockSettings) -> f32;
+    fn fit(
+        &mut self,
+        data: &[Datum<N>],
+        middle: Point,
+        radius: f32,
+        settings: &BlockSettings,
+    ) -> f32;
 
     /// Appends the logarithm at places, per channel, which stays near the data's range: beyond them the
     /// process is no more than a guess, and must not run away.
-    fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; 3]>);
+    fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; N]>);
 
     /// Appends the variance of the fitted process about its true value at places, per channel, as far as
     /// the data around can tell: the kriging variance times the variance that the data's values show;
     /// where [`Self::fit`] fell back to the mean, the variance of the data's values.
-    fn variances_at(&mut self, places: &[Point], out: &mut Vec<[f32; 3]>);
+    fn variances_at(&mut self, places: &[Point], out: &mut Vec<[f32; N]>);
 
     /// The variance of the mean of the fitted process over some places, as [`Self::variances_at`] has it
     /// for each.
-    fn variance_of_mean(&self, places: &[Point]) -> [f32; 3];
+    fn variance_of_mean(&self, places: &[Point]) -> [f32; N];
 }
 
 /// A block of one kernel.
-pub struct KrigingBlock<K: 'static> {
+pub struct KrigingBlock<K: 'static, const N: usize = 3> {
     kernel: &'static K,
-    process: Process,
+    process: Process<N>,
 }
 
-impl<K: Kernel> KrigingBlock<K> {
+impl<K: Kernel, const N: usize> KrigingBlock<K, N> {
     /// A block that is not fitted to anything yet.
     pub fn new(kernel: &'static K) -> Self {
         Self {
@@ -82,8 +86,14 @@ impl<K: Kernel> KrigingBlock<K> {
     }
 }
 
-impl<K: Kernel> Block for KrigingBlock<K> {
-    fn fit(&mut self, data: &[Datum], middle: Point, radius: f32, settings: &BlockSettings) -> f32 {
+impl<K: Kernel, const N: usize> Block<N> for KrigingBlock<K, N> {
+    fn fit(
+        &mut self,
+        data: &[Datum<N>],
+        middle: Point,
+        radius: f32,
+        settings: &BlockSettings,
+    ) -> f32 {
         let process = &mut self.process;
         let n = data.len();
         let padded = n.next_multiple_of(PAD);
@@ -94,7 +104,7 @@ impl<K: Kernel> Block for KrigingBlock<K> {
         let second = scale * settings.anisotropy;
         process.scale = [scale, scale, scale, second, second, second];
         process.load(data, padded);
-        process.limits = [0, 1, 2].map(|c| limits_of(&process.log_values[c][..n]));
+        process.limits = std::array::from_fn(|c| limits_of(&process.log_values[c][..n]));
         if n >= 2 {
             let mut nugget = None;
             // A pivot lost to rounding is mended by a larger nugget; the last of these makes any
@@ -122,7 +132,7 @@ impl<K: Kernel> Block for KrigingBlock<K> {
         1.0
     }
 
-    fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; 3]>) {
+    fn evaluate(&self, places: &[Point], out: &mut Vec<[f32; N]>) {
         self.process.arch.dispatch(Evaluate {
             kernel: self.kernel,
             process: &self.process,
@@ -131,7 +141,7 @@ impl<K: Kernel> Block for KrigingBlock<K> {
         });
     }
 
-    fn variances_at(&mut self, places: &[Point], out: &mut Vec<[f32; 3]>) {
+    fn variances_at(&mut self, places: &[Point], out: &mut Vec<[f32; N]>) {
         let process = &mut self.process;
         if !process.factored {
             out.extend(places.iter().map(|_| process.signal));
@@ -145,7 +155,7 @@ impl<K: Kernel> Block for KrigingBlock<K> {
         });
     }
 
-    fn variance_of_mean(&self, places: &[Point]) -> [f32; 3] {
+    fn variance_of_mean(&self, places: &[Point]) -> [f32; N] {
         if !self.process.factored || places.is_empty() {
             return self.process.signal;
         }
@@ -154,8 +164,7 @@ impl<K: Kernel> Block for KrigingBlock<K> {
 }
 
 /// A process fitted to data, and room to work in.
-#[derive(Default)]
-struct Process {
+struct Process<const N: usize> {
     matrix: Columns,
     /// Coordinates of the data from the middle, axis by axis, times √3 over the range.
     axes: [Vec<f32>; 6],
@@ -164,15 +173,15 @@ struct Process {
     /// The middle: where the coordinates count from. Distances come from scalar products, which
     /// single precision only bears near the origin.
     middle: Point,
-    log_values: [Vec<f32>; 3],
+    log_values: [Vec<f32>; N],
     counts: Vec<f32>,
     /// `K⁻¹ (y − μ)`, channel by channel.
-    weights: [Vec<f32>; 3],
-    mean: [f32; 3],
+    weights: [Vec<f32>; N],
+    mean: [f32; N],
     /// Values stay between these, channel by channel.
-    limits: [(f32, f32); 3],
+    limits: [(f32, f32); N],
     /// Variance of the process, channel by channel, by maximum likelihood.
-    signal: [f32; 3],
+    signal: [f32; N],
     /// Nodes in the factor.
     n: usize,
     /// Whether the matrix holds a factor.
@@ -187,13 +196,39 @@ struct Process {
     /// Variance of the drift's slope over that of the process.
     slope_variance: f32,
     /// By how much the slope is off, channel by channel.
-    slopes: [f32; 3],
+    slopes: [f32; N],
     arch: Arch,
 }
 
-impl Process {
+impl<const N: usize> Default for Process<N> {
+    fn default() -> Self {
+        Self {
+            matrix: Columns::default(),
+            axes: Default::default(),
+            norms: Vec::new(),
+            middle: Point::default(),
+            log_values: std::array::from_fn(|_| Vec::new()),
+            counts: Vec::new(),
+            weights: std::array::from_fn(|_| Vec::new()),
+            mean: [0.0; N],
+            limits: [(0.0, 0.0); N],
+            signal: [0.0; N],
+            n: 0,
+            factored: false,
+            columns: Vec::new(),
+            scale: Point::default(),
+            drift: Drift::default(),
+            drifts: Vec::new(),
+            slope_variance: 0.0,
+            slopes: [0.0; N],
+            arch: Arch::default(),
+        }
+    }
+}
+
+impl<const N: usize> Process<N> {
     /// Takes the data, in units of the range.
-    fn load(&mut self, data: &[Datum], padded: usize) {
+    fn load(&mut self, data: &[Datum<N>], padded: usize) {
         for buffer in self
             .axes
             .iter_mut()
@@ -213,7 +248,7 @@ impl Process {
             }
             let drift = self.drift.at(&datum.point);
             self.drifts[row] = drift - in_middle;
-            for c in 0..3 {
+            for c in 0..N {
                 self.log_values[c][row] = datum.log_value[c] - drift;
             }
             self.counts[row] = datum.count;
@@ -221,7 +256,7 @@ impl Process {
     }
 
     fn fall_back_to_mean(&mut self, n: usize) {
-        for c in 0..3 {
+        for c in 0..N {
             self.mean[c] = self.log_values[c].iter().sum::<f32>() / n.max(1) as f32;
             self.weights[c].fill(0.0);
             self.slopes[c] = 0.0;

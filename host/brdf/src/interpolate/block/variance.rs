@@ -15,14 +15,14 @@ fn kriging_variance(own: f32, uu: f32, zu: f32, zz: f32) -> f32 {
 }
 
 /// Appends the variances at places, channel by channel.
-pub(super) struct Variance<'a, K> {
+pub(super) struct Variance<'a, K, const N: usize> {
     pub(super) kernel: &'a K,
-    pub(super) process: &'a mut Process,
+    pub(super) process: &'a mut Process<N>,
     pub(super) places: &'a [Point],
-    pub(super) out: &'a mut Vec<[f32; 3]>,
+    pub(super) out: &'a mut Vec<[f32; N]>,
 }
 
-impl<K: Kernel> WithSimd for Variance<'_, K> {
+impl<K: Kernel, const N: usize> WithSimd for Variance<'_, K, N> {
     type Output = ();
 
     /// Places in the lanes: `u = L⁻¹ k`, column by column of L, for a vector of places at once; then
@@ -31,7 +31,7 @@ impl<K: Kernel> WithSimd for Variance<'_, K> {
     fn with_simd<S: Simd>(self, simd: S) {
         let s = self.process;
         let (n, lanes) = (s.n, S::F32_LANES);
-        let ones = s.norms.len() + 3;
+        let ones = s.norms.len() + N;
         let mut zz = 0.0f32;
         for j in 0..n {
             zz += s.matrix.column(j)[ones].powi(2);
@@ -95,7 +95,7 @@ impl<K: Kernel> WithSimd for Variance<'_, K> {
                 let own = 1.0 + s.slope_variance * buffer[7 * lanes + lane].powi(2);
                 let kriging = kriging_variance(own, uu, zu, zz);
                 let mut variance = s.signal;
-                for c in 0..3 {
+                for c in 0..N {
                     variance[c] *= kriging;
                 }
                 self.out.push(variance);
@@ -104,10 +104,10 @@ impl<K: Kernel> WithSimd for Variance<'_, K> {
     }
 }
 
-impl Process {
+impl<const N: usize> Process<N> {
     /// The variance of the mean over some places. All of them are one column of covariances, where
     /// [`Variance`] has one a place.
-    pub(super) fn variance_of_mean(&self, kernel: &impl Kernel, places: &[Point]) -> [f32; 3] {
+    pub(super) fn variance_of_mean(&self, kernel: &impl Kernel, places: &[Point]) -> [f32; N] {
         let share = 1.0 / places.len() as f32;
         let in_middle = self.drift.at(&self.middle);
         let drift = share
@@ -133,7 +133,7 @@ impl Process {
                 share * sum + self.slope_variance * self.drifts[j] * drift
             })
             .collect();
-        let ones = self.norms.len() + 3;
+        let ones = self.norms.len() + N;
         let (mut uu, mut zu, mut zz) = (0.0f32, 0.0f32, 0.0f32);
         for j in 0..self.n {
             let column = self.matrix.column(j);

@@ -19,12 +19,12 @@ const SMOOTH_MAX: f32 = 1.0;
 /// comparing all would cost as much again as the coarse blocks.
 const VARIANCE_LIMIT: f32 = 0.1;
 
-impl Refiner {
+impl<const N: usize> Refiner<N> {
     /// By how many standard deviations of a sample the coarse block of a pair may be off in each pair of
     /// parts, as far as one fine block tells; none where its variance is below the limit.
     pub fn deviations(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         pair: (&Patch, &Patch),
     ) -> &[f32] {
@@ -36,7 +36,7 @@ impl Refiner {
     /// Whether any part of the pair needs a block of its own beside the coarse one that was fitted last.
     pub(super) fn needs_refinement(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         pair: (&Patch, &Patch),
     ) -> bool {
@@ -60,7 +60,7 @@ impl Refiner {
     /// [`Self::deviations`] of the coarse block that was fitted last.
     fn estimate_deviations(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (p, q): (&Patch, &Patch),
     ) {
@@ -88,7 +88,7 @@ impl Refiner {
     /// parts; 0 where the coarse one's variance is below the limit.
     fn deviation_in(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (a, b): (&Part, &Part),
     ) -> f32 {
@@ -105,7 +105,7 @@ impl Refiner {
         part.variances.clear();
         self.coarse.variances_at(&self.places, &mut part.variances);
         let variance =
-            part.variances.iter().flatten().sum::<f32>() / (3 * part.variances.len()).max(1) as f32;
+            part.variances.iter().flatten().sum::<f32>() / (N * part.variances.len()).max(1) as f32;
         if variance < VARIANCE_LIMIT * (settings.tolerance * noise).powi(2) {
             return 0.0;
         }
@@ -120,7 +120,7 @@ impl Refiner {
         let logs = &self.part.logs;
         let pairs = self.logs.iter().flatten().zip(logs.iter().flatten());
         let squares: f32 = pairs.map(|(x, y)| (x - y).powi(2)).sum();
-        (squares / (3 * logs.len()).max(1) as f32).sqrt() / noise
+        (squares / (N * logs.len()).max(1) as f32).sqrt() / noise
     }
 
     /// Whether the cells of the coarse block that was fitted last follow from its corners: some cells are
@@ -156,14 +156,14 @@ impl Refiner {
 }
 
 /// By how much values change among some corners, summed over the channels.
-fn change(values: &[[f32; 3]], corners: impl Iterator<Item = usize>) -> f32 {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
+fn change<const N: usize>(values: &[[f32; N]], corners: impl Iterator<Item = usize>) -> f32 {
+    let mut low = [f32::INFINITY; N];
+    let mut high = [f32::NEG_INFINITY; N];
     for corner in corners {
-        for c in 0..3 {
+        for c in 0..N {
             low[c] = low[c].min(values[corner][c]);
             high[c] = high[c].max(values[corner][c]);
         }
     }
-    (0..3).map(|c| high[c] - low[c]).sum()
+    (0..N).map(|c| high[c] - low[c]).sum()
 }

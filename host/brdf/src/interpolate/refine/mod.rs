@@ -16,6 +16,7 @@ pub use predict::Predicted;
 use super::FillSettings;
 use super::blend::Shifts;
 use super::block::Block;
+use super::block::kernel::{AnyKernel, NewBlock};
 use super::coordinates::Point;
 use super::datum::Datum;
 use super::from_corners::FromCorners;
@@ -25,13 +26,13 @@ use crate::direction::Vec3;
 use places::{write_corners, write_places};
 
 /// What a thread keeps from pair to pair: blocks, and room to work in.
-pub struct Refiner {
+pub struct Refiner<const N: usize = 3> {
     /// The block of the pair, and the one of a part.
-    coarse: Box<dyn Block>,
-    fine: Box<dyn Block>,
+    coarse: Box<dyn Block<N>>,
+    fine: Box<dyn Block<N>>,
     /// The fine block that the coarse one was compared with, and where it was fitted: should the pair be
     /// refined, it serves again.
-    compared: Box<dyn Block>,
+    compared: Box<dyn Block<N>>,
     compared_at: Option<(Vec3, Vec3)>,
     /// By how many standard deviations of a sample the coarse block may be off in each pair of parts; none
     /// where its variance is below the limit.
@@ -39,56 +40,59 @@ pub struct Refiner {
     /// Merged data whose bins are looked at.
     near: Vec<Found>,
     found: Vec<Found>,
-    neighbourhood: Vec<Datum>,
+    neighbourhood: Vec<Datum<N>>,
     places: Vec<Point>,
     /// Logarithms of the pair's cells, light by light, and their variances.
-    logs: Vec<[f32; 3]>,
-    variances: Vec<[f32; 3]>,
+    logs: Vec<[f32; N]>,
+    variances: Vec<[f32; N]>,
     /// Logarithms at the pair's corners, corner by corner of the first patch.
-    corners: Vec<[f32; 3]>,
+    corners: Vec<[f32; N]>,
     /// What the coarse block gives there, where parts may give something else.
-    coarse_corners: Vec<[f32; 3]>,
-    part: PartBuffers,
-    from_corners: FromCorners,
+    coarse_corners: Vec<[f32; N]>,
+    part: PartBuffers<N>,
+    from_corners: FromCorners<N>,
 }
 
 /// Room for the parts of a pair.
 #[derive(Default)]
-struct PartBuffers {
+struct PartBuffers<const N: usize> {
     /// Logarithms of the cells of one part, and their variances.
-    logs: Vec<[f32; 3]>,
-    variances: Vec<[f32; 3]>,
+    logs: Vec<[f32; N]>,
+    variances: Vec<[f32; N]>,
     /// Logarithms at the corners of all parts, one part after the other.
-    corners: Vec<[f32; 3]>,
+    corners: Vec<[f32; N]>,
     /// How many parts a corner of the pair is in.
     count_at: Vec<u32>,
     /// What the parts differ from each other by, at their corners.
     differences: Vec<f32>,
-    shifts: Shifts,
+    shifts: Shifts<N>,
 }
 
 /// The logarithms of a pair of patches.
 #[derive(Clone, Copy, Debug)]
-pub struct Solved<'a> {
+pub struct Solved<'a, const N: usize = 3> {
     /// At the pair's corners, corner by corner of the first patch.
-    pub corners: &'a [[f32; 3]],
+    pub corners: &'a [[f32; N]],
     /// Whether the cells follow from the corners.
     pub is_smooth: bool,
     /// Of the cells, light by light; none where they follow from the corners, unless variances are wanted.
-    pub cells: &'a [[f32; 3]],
+    pub cells: &'a [[f32; N]],
     /// Variances of the cells' logarithms, not calibrated; none unless they are wanted.
-    pub variances: &'a [[f32; 3]],
+    pub variances: &'a [[f32; N]],
     /// Pairs of parts that got a block of their own; `None` where the coarse block does for all.
     pub refined: Option<usize>,
 }
 
-impl Refiner {
+impl<const N: usize> Refiner<N> {
     /// One for settings like these.
-    pub fn new(settings: &FillSettings) -> Self {
+    pub fn new(settings: &FillSettings) -> Self
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
         Self {
-            coarse: settings.kernel.new_block(),
-            fine: settings.kernel.new_block(),
-            compared: settings.kernel.new_block(),
+            coarse: NewBlock::<N>::new_block(settings.kernel),
+            fine: NewBlock::<N>::new_block(settings.kernel),
+            compared: NewBlock::<N>::new_block(settings.kernel),
             compared_at: None,
             deviations: Vec::new(),
             near: Vec::new(),
@@ -107,11 +111,11 @@ impl Refiner {
     /// Interpolates the cells of a pair.
     pub fn solve(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         pair: (&Patch, &Patch),
         with_variances: bool,
-    ) -> Solved<'_> {
+    ) -> Solved<'_, N> {
         self.fit_coarse(data, settings, pair);
         let needs_refinement = self.needs_refinement(data, settings, pair);
         self.logs.clear();
@@ -131,7 +135,7 @@ impl Refiner {
         self.solved(is_smooth, None)
     }
 
-    fn solved(&self, is_smooth: bool, refined: Option<usize>) -> Solved<'_> {
+    fn solved(&self, is_smooth: bool, refined: Option<usize>) -> Solved<'_, N> {
         Solved {
             corners: &self.corners,
             is_smooth,
@@ -144,7 +148,7 @@ impl Refiner {
     /// A coarse block, through merged data, and what it gives at the corners.
     fn fit_coarse(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (p, q): (&Patch, &Patch),
     ) {
@@ -164,7 +168,7 @@ impl Refiner {
     /// A fine block around a pair of directions, through the bins' own data.
     fn fit_fine(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (light, view): (Vec3, Vec3),
     ) {
@@ -179,7 +183,7 @@ impl Refiner {
     }
 
     /// The data that were found.
-    fn gather(&mut self, data: &impl Neighbours, detail: Detail) {
+    fn gather(&mut self, data: &impl Neighbours<N>, detail: Detail) {
         self.neighbourhood.clear();
         let found = self.found.iter().map(|(_, k)| data.datum(detail, *k));
         self.neighbourhood.extend(found);

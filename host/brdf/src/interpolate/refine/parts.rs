@@ -8,26 +8,26 @@ use crate::interpolate::blend::{difference, limit_of};
 use crate::interpolate::hierarchy::Neighbours;
 use crate::interpolate::patches::{Part, Patch};
 
-impl Refiner {
+impl<const N: usize> Refiner<N> {
     /// Writes the cells of all parts of a pair, and what they agree on at its corners; returns how many
     /// pairs of parts got a block of their own.
     pub(super) fn solve_parts(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (p, q): (&Patch, &Patch),
         with_variances: bool,
     ) -> usize {
         let cells = p.directions.len() * q.directions.len();
-        self.logs.resize(cells, [0.0; 3]);
+        self.logs.resize(cells, [0.0; N]);
         if with_variances {
-            self.variances.resize(cells, [0.0; 3]);
+            self.variances.resize(cells, [0.0; N]);
         }
         self.part.corners.clear();
         self.part.count_at.clear();
         self.part.count_at.resize(self.corners.len(), 0);
         self.coarse_corners.clone_from(&self.corners);
-        self.corners.fill([0.0; 3]);
+        self.corners.fill([0.0; N]);
         let mut refined = 0;
         for (number, (a, b)) in pairs_of_parts(p, q).enumerate() {
             let first = self.part.corners.len();
@@ -45,7 +45,7 @@ impl Refiner {
             }
             for (k, corner) in corners_in(a, b, q).enumerate() {
                 self.part.count_at[corner] += 1;
-                for c in 0..3 {
+                for c in 0..N {
                     self.corners[corner][c] += self.part.corners[first + k][c];
                 }
             }
@@ -88,7 +88,7 @@ impl Refiner {
     /// A pair of parts in a fine block: its cells and, appended, its corners.
     fn solve_part(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (a, b): (&Part, &Part),
         with_variances: bool,

@@ -8,29 +8,29 @@ use crate::interpolate::patches::{Part, Patch};
 
 /// What a block gives at some places.
 #[derive(Clone, Copy, Debug)]
-pub struct Predicted<'a> {
+pub struct Predicted<'a, const N: usize = 3> {
     /// Natural logarithms.
-    pub logs: &'a [[f32; 3]],
+    pub logs: &'a [[f32; N]],
     /// Variance of the first.
-    pub variance: [f32; 3],
+    pub variance: [f32; N],
     /// Variance of their mean.
-    pub variance_of_mean: [f32; 3],
+    pub variance_of_mean: [f32; N],
 }
 
 /// So many places, about, tell the variance of the mean of more.
 const MEAN_OF: usize = 8;
 
-impl Refiner {
+impl<const N: usize> Refiner<N> {
     /// The natural logarithms at places of a pair: what [`Self::solve`] would give for cells there. The
     /// block is that of the first of them; of the others those are kept that it serves for too.
     /// Variances are not calibrated.
     pub fn predict(
         &mut self,
-        data: &impl Neighbours,
+        data: &impl Neighbours<N>,
         settings: &FillSettings,
         (p, q): (&Patch, &Patch),
         places: &mut Vec<impl AsRef<(Vec3, Vec3)>>,
-    ) -> Predicted<'_> {
+    ) -> Predicted<'_, N> {
         self.fit_coarse(data, settings, (p, q));
         let refines = self.needs_refinement(data, settings, (p, q));
         let part_of = |(light, view): (Vec3, Vec3)| {
@@ -73,7 +73,7 @@ impl Refiner {
         self.places = self.places.iter().copied().step_by(step).collect();
         Predicted {
             logs: &part.logs,
-            variance: part.variances.first().copied().unwrap_or_default(),
+            variance: part.variances.first().copied().unwrap_or([0.0; N]),
             variance_of_mean: block.variance_of_mean(&self.places),
         }
     }

@@ -1,30 +1,20 @@
-//! The arm controller on a NUCLEO-F446RE (STM32F446RE, 168 MHz).
+//! The arm controller on boards with an STM32F446 at 168 MHz.
 //!
-//! What it is: the firmware core on real pins. One board an arm; a jumper tells which.
+//! What it is: the firmware core on real pins. One board an arm; a jumper tells which. Which pin does what is
+//! data, one file a board (`gonia_pins::boards`); everything here that touches a register does so for all of
+//! them. The tables of the wiring pages are made from the same data.
 //!
-//! | function | pin | Nucleo |
-//! |---|---|---|
-//! | wire to the host: USART2, through the ST-Link's USB | PA2, PA3 | – |
-//! | θ: step (TIM5), direction | PA0, PA9 | A0, D8 |
-//! | φ: step (TIM2), direction | PB10, PB4 | D6, D5 |
-//! | θ encoder (SSI): clock, data | PA5, PA6 | D13, D12 |
-//! | φ encoder (SSI): clock, data | PB13, PB14 | CN10-30, CN10-28 |
-//! | home switches θ, φ (to ground when closed) | PC0, PC1 | A5, A4 |
-//! | interlock chain (to ground when closed) | PC2 | CN7-35 |
-//! | interlock relay (TIM8, high: its contact closes this arm's part of the chain) | PC6 | CN10-4 |
-//! | drivers' current (high: on) | PC3 | CN7-37 |
-//! | trigger out, trigger in from the other arm (both TIM3) | PB5, PC8 | D4, CN10-2 |
-//! | camera arm: jumper to ground; light arm: open | PB0 | A3 |
+//! In reset every pin floats: the resistors of the wiring page hold the outputs off, which is no step, no
+//! trigger, no current, and the chain open.
 //!
-//! In reset every pin floats: the pull-downs of `docs/src/guides/arms.md` hold the outputs low, which is no
-//! step, no trigger, no current, and the chain open.
-//!
-//! Settings: flash sectors 1 and 2. Log: defmt over RTT (`cargo run --release` with probe-rs).
+//! Log: defmt over RTT (`cargo run --release --bin gonia-NAME` with probe-rs).
 #![no_std]
-#![no_main]
 
 mod alive;
 mod arm;
+mod before;
+mod encoder;
+mod gpio;
 mod pulses;
 mod sectors;
 mod steps;
@@ -36,21 +26,14 @@ use cortex_m::peripheral::SCB;
 use cortex_m::singleton;
 use cortex_m_rt::{ExceptionFrame, exception};
 use defmt_rtt as _;
-use embassy_executor::Spawner;
 use embassy_futures::select::{Either3, select3};
 use embassy_stm32::flash::Flash;
-use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::interrupt::typelevel::{Interrupt, USART2};
-use embassy_stm32::peripherals::{TIM2, TIM3, TIM5, TIM8};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
-use embassy_stm32::spi::{self, MODE_2, Spi};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::timer::input_capture::CapturePin;
-use embassy_stm32::timer::simple_pwm::PwmPin;
-use embassy_stm32::timer::{Ch1, Ch2, Ch3};
 use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config as UartConfig};
 use embassy_stm32::{Peri, bind_interrupts, pac, peripherals, usart};
 use embassy_time::{Instant, Timer};
@@ -58,104 +41,106 @@ use embedded_io_async::{Read, Write};
 use gonia_firmware::board::{self, Board, Wake};
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::node::{ControllerNode, identity};
-use gonia_firmware::ssi::SsiEncoder;
+use gonia_firmware::spi_encoder::SpiEncoder;
 use gonia_firmware::store::Store;
+use gonia_pins::check::PLL_INPUT_HZ;
+use gonia_pins::{Board as Pins, Crystal, Pin};
 use gonia_protocol::message::ResetReason;
 use gonia_protocol::{BAUD, NODE_CAMERA, NODE_LIGHT};
 use static_cell::StaticCell;
 
 use crate::arm::ArmPins;
+use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
 
 bind_interrupts!(struct Interrupts {
     USART2 => usart::BufferedInterruptHandler<peripherals::USART2>;
 });
 
-/// Clock of both rings, Hz: what 50 m of cable allow, and dividers make of both buses' clocks exactly (84 MHz
-/// by 256, 42 MHz by 128).
-const SSI_HZ: u32 = 328_125;
 /// A pin whose pull-up has just been switched on is high after this, cycles of the processor: 50 µs, for 1 nF
 /// of cable at 40 kΩ.
 const PULL_UP_CYCLES: u32 = 8_400;
 
-#[embassy_executor::main]
-async fn main(_spawner: Spawner) {
+/// Runs the arm's controller on a board, for ever.
+pub async fn run(of: &'static Pins) -> ! {
     let reset = take_reset_reason();
-    let p = embassy_stm32::init(clocks());
+    let p = embassy_stm32::init(clocks(of.crystal));
     switch_on_caches();
+    set_brown_out_level();
     time::start();
 
-    let mut sectors = FlashSectors(Flash::new_blocking(p.FLASH));
+    let mut sectors = FlashSectors::new(Flash::new_blocking(p.FLASH), of.layout.settings);
     let (store, settings) = Store::open(&mut sectors);
-    let output = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Medium);
-    let switch = |pin: Peri<'static, AnyPin>| Input::new(pin, Pull::Up);
     let is_camera = {
-        let jumper = Input::new(p.PB0, Pull::Up);
+        let jumper = gpio::switch(of.camera_jumper);
         cortex_m::asm::delay(PULL_UP_CYCLES);
         jumper.is_low()
     };
     let address = if is_camera { NODE_CAMERA } else { NODE_LIGHT };
-    let theta = Spi::new_blocking_rxonly(p.SPI1, p.PA5, p.PA6, ssi_config());
-    let phi = Spi::new_blocking_rxonly(p.SPI2, p.PB13, p.PB14, ssi_config());
-    // A dropped pin goes back to an input: these stay with their timers.
-    core::mem::forget(PwmPin::<TIM5, Ch1>::new(p.PA0, OutputType::PushPull));
-    core::mem::forget(PwmPin::<TIM2, Ch3>::new(p.PB10, OutputType::PushPull));
-    core::mem::forget(PwmPin::<TIM3, Ch2>::new(p.PB5, OutputType::PushPull));
-    core::mem::forget(CapturePin::<TIM3, Ch3>::new(p.PC8, Pull::Down));
-    core::mem::forget(PwmPin::<TIM8, Ch1>::new(p.PC6, OutputType::PushPull));
-    pulses::start();
-    steps::start([output(p.PA9.into()), output(p.PB4.into())]);
+    let encoders = of
+        .axes
+        .map(|axis| SpiEncoder::new(EncoderSpi::start(axis.encoder)));
+    pulses::start(of);
+    steps::start(&of.axes);
     let pins = ArmPins {
-        encoders: [SsiEncoder::new(theta), SsiEncoder::new(phi)],
-        home_switches: [switch(p.PC0.into()), switch(p.PC1.into())],
-        interlock: switch(p.PC2.into()),
+        encoders,
+        home_switches: of.axes.map(|axis| gpio::switch(axis.home_switch)),
+        alarms: of.alarms.map(|alarms| alarms.map(gpio::switch)),
+        interlock: gpio::switch(of.interlock),
         store,
         sectors,
     };
-
-    let (Some(tx), Some(rx)) = (
-        singleton!(: [u8; 2048] = [0; 2048]),
-        singleton!(: [u8; 1024] = [0; 1024]),
-    ) else {
-        defmt::panic!("main runs once");
-    };
-    let mut config = UartConfig::default();
-    config.baudrate = BAUD;
-    let uart = BufferedUart::new(p.USART2, p.PA3, p.PA2, tx, rx, Interrupts, config);
-    let Ok(uart) = uart else {
-        defmt::panic!("USART2 cannot do {} baud", BAUD);
-    };
-    let (to_host, from_host) = uart.split();
+    let (to_host, from_host) = host_wire(of, p.USART2).split();
     // Behind the steps' and the trigger's.
     USART2::set_priority(Priority::P4);
 
     static NODE: StaticCell<ControllerNode> = StaticCell::new();
-    alive::start();
+    alive::start(of);
     pins.await_chain();
-    let mut drivers = output(p.PC3.into());
-    drivers.set_high();
-    core::mem::forget(drivers);
     let controller = ArmController::new(now_us(), settings.as_deref());
     let last_panic = panic_persist::get_panic_message_utf8().unwrap_or_default();
-    let identity = identity("stm32f4", board::next_boot_id(), reset, last_panic);
+    let identity = identity(of.name, board::next_boot_id(), reset, last_panic);
     let node = NODE.init(ControllerNode::new(address, identity, controller));
     defmt::info!("ready, address {}", address);
-    let mut nucleo = Nucleo {
+    let mut board = Wired {
         pins,
         to_host,
         from_host,
     };
-    board::run(node, &mut nucleo).await
+    board::run(node, &mut board).await
+}
+
+/// The UART of the host, on the pins that the board has it on.
+fn host_wire(of: &Pins, usart: Peri<'static, peripherals::USART2>) -> BufferedUart<'static> {
+    let (Some(tx), Some(rx)) = (
+        singleton!(: [u8; 2048] = [0; 2048]),
+        singleton!(: [u8; 1024] = [0; 1024]),
+    ) else {
+        defmt::panic!("the program begins once");
+    };
+    let mut config = UartConfig::default();
+    config.baudrate = BAUD;
+    // SAFETY: a board uses each pin once (`gonia_pins::check`).
+    let p = unsafe { embassy_stm32::Peripherals::steal() };
+    let uart = if of.host_tx.pin == Pin::new('A', 2) {
+        BufferedUart::new(usart, p.PA3, p.PA2, tx, rx, Interrupts, config)
+    } else {
+        BufferedUart::new(usart, p.PD6, p.PD5, tx, rx, Interrupts, config)
+    };
+    match uart {
+        Ok(uart) => uart,
+        Err(_) => defmt::panic!("USART2 cannot do {} baud", BAUD),
+    }
 }
 
 /// What the board offers to the main loop.
-struct Nucleo {
+struct Wired {
     pins: ArmPins,
     to_host: BufferedUartTx<'static>,
     from_host: BufferedUartRx<'static>,
 }
 
-impl Board for Nucleo {
+impl Board for Wired {
     type Pins = ArmPins;
 
     fn now_us(&self) -> u64 {
@@ -195,6 +180,24 @@ fn switch_on_caches() {
     });
 }
 
+/// Reset below 2.7 V (level 3): less is too little for 168 MHz and for erasing by words, and a processor that
+/// runs on does anything. The level is an option byte, which is written once in a board's life, and holds from
+/// the next reset on.
+fn set_brown_out_level() {
+    const KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
+    const LEVEL_3: u8 = 0;
+    if pac::FLASH.optcr().read().bor_lev() == LEVEL_3 {
+        return;
+    }
+    for key in KEYS {
+        pac::FLASH.optkeyr().write_value(key);
+    }
+    pac::FLASH.optcr().modify(|w| w.set_bor_lev(LEVEL_3));
+    pac::FLASH.optcr().modify(|w| w.set_optstrt(true));
+    while pac::FLASH.sr().read().bsy() {}
+    pac::FLASH.optcr().modify(|w| w.set_optlock(true));
+}
+
 /// The processor cannot go on: what moves is stopped first.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
@@ -212,24 +215,20 @@ fn panic(info: &PanicInfo) -> ! {
     SCB::sys_reset()
 }
 
-/// SPI settings that speak SSI.
-fn ssi_config() -> spi::Config {
-    let mut config = spi::Config::default();
-    config.mode = MODE_2;
-    config.frequency = Hertz(SSI_HZ);
-    config
-}
-
-/// 168 MHz from the 8 MHz that the ST-Link provides.
-fn clocks() -> embassy_stm32::Config {
+/// 168 MHz from what the board has.
+fn clocks(crystal: Crystal) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
-        freq: Hertz(8_000_000),
-        mode: HseMode::Bypass,
+        freq: Hertz(crystal.hz),
+        mode: if crystal.is_given {
+            HseMode::Bypass
+        } else {
+            HseMode::Oscillator
+        },
     });
     config.rcc.pll_src = PllSource::HSE;
     config.rcc.pll = Some(Pll {
-        prediv: PllPreDiv::DIV4,
+        prediv: PllPreDiv::from_bits((crystal.hz / PLL_INPUT_HZ) as u8),
         mul: PllMul::MUL168,
         divp: Some(PllPDiv::DIV2),
         divq: None,
