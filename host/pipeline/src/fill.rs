@@ -534,7 +534,7 @@ impl Binned {
         let isotropy = match (symmetry.is_isotropic(), reason) {
             (false, _) => Isotropy::No,
             (_, Reason::Asked) => Isotropy::Asked,
-            (_, Reason::Assumed) => Isotropy::Assumed,
+            (_, Reason::Assumed | Reason::TooFew) => Isotropy::Assumed,
             _ => Isotropy::Shown,
         };
         let images = symmetry.order();

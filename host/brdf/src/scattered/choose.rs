@@ -19,7 +19,7 @@ const TESTS: usize = 240;
 /// The same where a weak dependence on the azimuth is looked for.
 const MANY_TESTS: usize = 1500;
 /// With fewer places than this a plane of symmetry is searched for only on request.
-const PLANE_MIN: usize = 300;
+const PLANE_MIN: usize = 60;
 /// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 24;
 /// In the search for a dependence on the azimuth a residual beyond so many times the median of all counts as that.
@@ -28,6 +28,10 @@ const OUTLIER: f64 = 5.0;
 const WORSE_SHARE: f64 = 0.02;
 /// … and by so many standard errors of the difference.
 const WORSE_SIGMAS: f64 = 1.5;
+/// … and its mean error is not larger than the least by this share: few that are far off, as on a lobe, count there.
+const SIMPLER_SHARE: f64 = 0.05;
+/// Of so many samples all that looks like noise may be a dependence on the azimuth, and of more in proportion.
+const HIDDEN: f64 = 100.0;
 /// A dependence on the azimuth is shown where its size is so many standard errors …
 const SHOWN_SIGMAS: f64 = 4.0;
 /// … of one of so many waves.
@@ -42,12 +46,13 @@ const UNTESTED_FACTOR: f64 = 2.0;
 const FACTORS: (f64, f64) = (1.0, 20.0);
 
 /// Kernels and nuggets that compete: smooth to rough, little noise to much.
-const KERNELS: [(ScatteredKernel, f64); 5] = [
+const KERNELS: [(ScatteredKernel, f64); 6] = [
     (ScatteredKernel::Matern32, 1e-6),
     (ScatteredKernel::Matern32, 1e-2),
     (ScatteredKernel::Matern32, 1.0),
     (ScatteredKernel::Exponential, 1e-4),
     (ScatteredKernel::Exponential, 1e-2),
+    (ScatteredKernel::Exponential, 1e-1),
 ];
 /// Then the best nugget is tried times these.
 const NUGGETS: [f64; 7] = [0.1, 0.3, 3.0, 10.0, 30.0, 100.0, 1000.0];
@@ -127,7 +132,7 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
     };
     let tests = Tests::new(data, TESTS);
     if tests.numbers.len() < TESTS_MIN {
-        return untested(asked, one_azimuth, reason);
+        return untested(asked, reason);
     }
     let symmetries: &[Symmetry] = match asked {
         Some(SymmetryKind::Isotropic) => &[Symmetry::Isotropic, Symmetry::Turns],
@@ -141,7 +146,7 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
             Symmetry::None,
         ],
     };
-    let trials: Vec<Trial> = symmetries
+    let first: Vec<Trial> = symmetries
         .iter()
         .flat_map(|symmetry| {
             [true, false].map(|reciprocal_data| Settings {
@@ -152,10 +157,12 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
         })
         .map(|settings| tests.trial(settings))
         .collect();
-    let usual = trials
-        .iter()
-        .map(Trial::median)
-        .fold(RESIDUAL_MAX, f64::min);
+    let usual = first.iter().map(Trial::median).fold(RESIDUAL_MAX, f64::min);
+    // Each symmetry is compared with the coordinates and the kernel that suit it.
+    let trials: Vec<Trial> = first
+        .chunks(2)
+        .map(|both| tests.suited(simplest(both, &tests, usual, false), usual))
+        .collect();
     let may_depend_on_azimuth = asked.is_none() && !one_azimuth;
     let start = simplest(&trials, &tests, usual, may_depend_on_azimuth);
     let start = match start.settings.symmetry.is_isotropic() {
@@ -168,6 +175,12 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
         let many = Tests::new(data, MANY_TESTS);
         if many.shows_azimuth(&many.trial(best.settings)) {
             best = tests.tuned(with_plane(&trials, &tests, usual, asked), usual);
+        }
+        if best.settings.symmetry.is_isotropic() {
+            best = tests.trial(Settings {
+                hidden: (HIDDEN / data.places.len() as f64).min(1.0),
+                ..best.settings
+            });
         }
     }
     let contradicted_by = asked
@@ -183,20 +196,15 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
 }
 
 /// What is taken of too few data to test anything by.
-fn untested(asked: Option<SymmetryKind>, one_azimuth: bool, reason: Reason) -> Choice {
-    let unasked = if one_azimuth {
-        Symmetry::Isotropic
-    } else {
-        Symmetry::None
-    };
+fn untested(asked: Option<SymmetryKind>, reason: Reason) -> Choice {
     let reason = if reason == Reason::Shown {
         Reason::TooFew
     } else {
         reason
     };
     let settings = Settings {
-        symmetry: asked.map_or(unasked, SymmetryKind::untested),
-        ..Settings::DEFAULT
+        symmetry: asked.map_or(Settings::FEW.symmetry, SymmetryKind::untested),
+        ..Settings::FEW
     };
     Choice {
         reason,
@@ -266,11 +274,14 @@ fn simplest(trials: &[Trial], tests: &Tests, usual: f64, may_depend_on_azimuth: 
         .iter()
         .filter(sound)
         .min_by(|a, b| a.level(usual).total_cmp(&b.level(usual)));
+    let errors = trials.iter().filter(sound).map(|t| t.error);
+    let enough = (1.0 + SIMPLER_SHARE) * errors.fold(f64::INFINITY, f64::min);
     let first = |best: &Trial| {
         trials
             .iter()
             .filter(sound)
-            .find(|trial| !worse(trial, best, usual))
+            .find(|trial| !worse(trial, best, usual) && trial.error <= enough)
+            .or(Some(best))
             .cloned()
     };
     best.and_then(first).unwrap_or(Trial {
@@ -435,8 +446,8 @@ impl<'a> Tests<'a> {
         }
     }
 
-    /// The same symmetry with the coordinates, the kernel and the nugget that predict best.
-    fn tuned(&self, start: Trial, usual: f64) -> Trial {
+    /// The same symmetry with the coordinates and the kernel that predict best.
+    fn suited(&self, start: Trial, usual: f64) -> Trial {
         let systems = [
             Coordinates::sum_difference(0.5),
             Coordinates {
@@ -446,7 +457,7 @@ impl<'a> Tests<'a> {
             Coordinates::half_difference(0.3),
         ];
         let mut best = start;
-        let mut around = self.neighbourhoods(best.settings);
+        let around = self.neighbourhoods(best.settings);
         for (kernel, nugget) in KERNELS {
             let settings = Settings {
                 kernel,
@@ -459,11 +470,16 @@ impl<'a> Tests<'a> {
                 coordinates,
                 ..best.settings
             };
-            let others = self.neighbourhoods(settings);
-            if self.try_at(&others, settings, usual, &mut best) {
-                around = others;
-            }
+            let around = self.neighbourhoods(settings);
+            self.try_at(&around, settings, usual, &mut best);
         }
+        best
+    }
+
+    /// The same with the noise and the number of samples to a datum that predict best.
+    fn tuned(&self, start: Trial, usual: f64) -> Trial {
+        let mut best = start;
+        let around = self.neighbourhoods(best.settings);
         self.with_likely_nugget(&around, usual, &mut best);
         self.with_noise(&around, usual, &mut best);
         self.merge(usual, &mut best);
@@ -559,19 +575,11 @@ impl<'a> Tests<'a> {
     }
 
     /// Takes settings in place of the best ones where they predict better.
-    fn try_at(
-        &self,
-        around: &Neighbourhoods,
-        settings: Settings,
-        usual: f64,
-        best: &mut Trial,
-    ) -> bool {
+    fn try_at(&self, around: &Neighbourhoods, settings: Settings, usual: f64, best: &mut Trial) {
         let trial = self.trial_at(around, settings);
-        let is_better = trial.level(usual) < best.level(usual);
-        if is_better {
+        if trial.level(usual) < best.level(usual) {
             *best = trial;
         }
-        is_better
     }
 
     /// Whether what is left after a fit depends on the azimuth of light or view.
@@ -647,30 +655,30 @@ impl Trial {
             .sum()
     }
 
-    /// With which 95 % of the residuals lie within 1.96 standard errors, noise included; the more noise hides of the
-    /// error, the nearer to what the systems say themselves.
+    /// With which 95 % of the residuals lie within 1.96 standard errors, noise included. A residual counts by the share
+    /// of its variance that is not noise: what noise hides says nothing. Where all is noise, the systems' own errors stand.
     fn factor(&self) -> f64 {
-        let mut squares: Vec<f64> = self
+        let mut shown: Vec<(f64, f64)> = self
             .residuals
             .iter()
             .zip(&self.predictions)
             .flat_map(|(r, p)| {
                 [0, 1, 2].map(|c| {
                     let variance = p.relative[c].powi(2).max(1e-18);
-                    ((r[c] / Z95).powi(2) - p.noise[c]) / variance
+                    let ratio = ((r[c] / Z95).powi(2) - p.noise[c]) / variance;
+                    (ratio, variance / (variance + p.noise[c]))
                 })
             })
             .collect();
-        squares.sort_by(f64::total_cmp);
-        // Of few, rather one too many.
-        let rank = ((0.95 * squares.len() as f64).ceil() as usize).min(squares.len() - 1);
-        let shown = squares[rank].clamp(FACTORS.0.powi(2), FACTORS.1.powi(2));
-        let shares = self.predictions.iter().map(|p| {
-            let variance = p.relative[1].powi(2).max(1e-18);
-            variance / (variance + p.noise[1])
+        shown.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let sum: f64 = shown.iter().map(|(_, share)| share).sum();
+        let mut within = 0.0;
+        let last = shown.iter().find(|(_, share)| {
+            within += share;
+            within >= 0.95 * sum
         });
-        let share = shares.sum::<f64>() / self.predictions.len() as f64;
-        (share * shown + 1.0 - share).sqrt()
+        let ratio = last.map_or(1.0, |(ratio, _)| *ratio);
+        ratio.clamp(FACTORS.0.powi(2), FACTORS.1.powi(2)).sqrt()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::data::Datum;
 use super::nugget::{largest_nugget, likely_nugget};
 use super::places::Near;
-use super::wide::{Axes, Correlations, Covariance, Factor, covariances, dot};
+use super::wide::{Axes, Correlations, Covariance, Factor, Noise, covariances, dot};
 use super::{Response, Settings};
 use crate::elementary::Elementary;
 use crate::interpolate::coordinates::Pair;
@@ -24,6 +24,8 @@ pub(super) struct Local {
     nugget: f64,
     /// Mean variance of a datum's noise over that of one sample.
     shares: f64,
+    /// See [`Settings::hidden`].
+    hidden: f64,
 }
 
 /// One channel of a system.
@@ -73,6 +75,17 @@ const ABOVE_ZERO: f64 = 0.1;
 /// Of more noise than this (its relative variance), half of it is not what logarithms lie lower by.
 const NOISE_MAX: f64 = 0.25;
 
+/// Which of the data near a place are images of one.
+fn same_datum(near: &[Near]) -> Vec<(usize, usize)> {
+    let later = |(i, a): (usize, &Near)| {
+        let datum = a.datum;
+        let same = near.iter().enumerate().skip(i + 1);
+        same.filter(move |(_, b)| b.datum == datum)
+            .map(move |(j, _)| (i, j))
+    };
+    near.iter().enumerate().flat_map(later).collect()
+}
+
 impl Local {
     /// `None` of no data. The range is in radii of the usual number of data, however many there are.
     pub fn fit(data: &[Datum], near: &[Near], settings: &Settings) -> Option<Self> {
@@ -90,7 +103,14 @@ impl Local {
             scale: settings.kernel.scale() / (settings.range * usual.distance()),
         };
         let at = Axes::of(near.iter().map(|n| n.pair));
-        let noise: Vec<f64> = here.iter().map(|d| 1.0 / d.count).collect();
+        let noise = Noise {
+            variances: here.iter().map(|d| 1.0 / d.count).collect(),
+            // Where noise is little, images that agree show how little.
+            same: match response {
+                Response::Linear => same_datum(near),
+                Response::Logarithm => Vec::new(),
+            },
+        };
         let values = |c: usize| -> Vec<f64> {
             let value = |d: &&Datum| match response {
                 Response::Logarithm => d.log[c],
@@ -100,7 +120,7 @@ impl Local {
         };
         let all = [0, 1, 2].map(values);
         let mut nugget = settings.nugget;
-        let of_green = (&all[1][..], &noise[..]);
+        let of_green = (&all[1][..], &noise);
         if response == Response::Linear {
             nugget += largest_nugget(arch, near, of_green, covariance, settings);
         } else if settings.noise_variance > 0.0 {
@@ -128,7 +148,8 @@ impl Local {
             ones2,
             channels: Vec::new(),
             nugget,
-            shares: noise.iter().sum::<f64>() / noise.len() as f64,
+            shares: noise.variances.iter().sum::<f64>() / near.len() as f64,
+            hidden: settings.hidden,
         };
         let is_grey = all[0] == all[1] && all[1] == all[2];
         local.channels = all[..if is_grey { 1 } else { 3 }]
@@ -205,10 +226,10 @@ impl Local {
                 Response::Logarithm => {
                     // Noise that is as much above as below lies lower in logarithms, by half its variance.
                     let noise = self.nugget * channel.signal;
-                    predicted.noise[c] = noise;
+                    predicted.noise[c] = (1.0 - self.hidden) * noise;
                     predicted.value[c] =
                         (fitted + 0.5 * (noise * self.shares).min(NOISE_MAX)).exponential();
-                    predicted.relative[c] = error;
+                    predicted.relative[c] = (error * error + self.hidden * noise).sqrt();
                 }
                 Response::Linear => {
                     let value = fitted.max(ABOVE_ZERO * error).max(1e-30);

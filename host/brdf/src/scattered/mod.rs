@@ -95,10 +95,12 @@ pub struct Settings {
     pub noise_variance: f64,
     /// Neighbouring places that are merged into one datum, at most.
     pub merged: usize,
+    /// Share of what looks like noise that may be a dependence on what the settings leave out, and is an error then.
+    pub hidden: f64,
 }
 
 impl Settings {
-    /// What is taken of data that are too few for cross-validation.
+    /// What cross-validation begins with.
     pub const DEFAULT: Settings = Settings {
         symmetry: Symmetry::None,
         reciprocal_data: true,
@@ -109,6 +111,17 @@ impl Settings {
         nugget: 1e-4,
         noise_variance: 0.0,
         merged: 1,
+        hidden: 0.0,
+    };
+
+    /// What is taken of data that are too few for cross-validation: straight from one to the next, and nothing
+    /// beyond them. Isotropic: ten samples bear three angles better than four.
+    pub const FEW: Settings = Settings {
+        symmetry: Symmetry::Isotropic,
+        coordinates: Coordinates::half_difference(0.3),
+        kernel: ScatteredKernel::Exponential,
+        nugget: 1e-2,
+        ..Settings::DEFAULT
     };
 
     /// The same with another nugget: little of a signal is left in noise, and more data average it.
@@ -585,6 +598,59 @@ mod tests {
                 > 0.0
         );
         assert!(ScatteredFit::new(&of_material(5, true, 1.0, 0.0), None).is_none());
+        // At several azimuths: three angles are what so few bear, with errors that hold.
+        let few = ScatteredFit::new(&of_material(16, false, 1.0, 0.0), None).unwrap();
+        assert_eq!(few.choice().reason, Reason::TooFew);
+        assert_eq!(few.choice().settings.symmetry, Symmetry::Isotropic);
+        let (rms, within) = error(&few, 1.0, 0.0);
+        assert!(rms < 0.4, "{rms}");
+        assert!(within > 0.9, "{within}");
+    }
+
+    #[test]
+    fn a_hundred_anisotropic_samples_are_not_made_isotropic_and_their_errors_hold() {
+        let fit = ScatteredFit::new(&of_material(100, false, 1.5, 0.0), None).unwrap();
+        let symmetry = fit.choice().settings.symmetry;
+        assert!(!symmetry.is_isotropic(), "{symmetry}");
+        let (rms, within) = error(&fit, 1.5, 0.0);
+        assert!(rms < 0.25, "{rms}");
+        assert!(within > 0.9, "{within}");
+        // Of as many isotropic ones, what is taken for noise may be a dependence on the azimuth.
+        let fit = ScatteredFit::new(&of_material(100, false, 1.0, 0.0), None).unwrap();
+        assert!(fit.choice().settings.symmetry.is_isotropic());
+        assert_eq!(fit.choice().settings.hidden, 1.0);
+        let (_, within) = error(&fit, 1.0, 0.0);
+        assert!(within > 0.9, "{within}");
+    }
+
+    #[test]
+    fn images_of_one_sample_count_as_one() {
+        // Of noise about zero every datum weighs the same: threes whose light and view differ have four images, and minus
+        // ones, in which half a turn exchanges light and view, have two.
+        let at = |theta_i: f64, theta_v: f64, phi_v: f64, value: f32| {
+            let light = Direction::from_deg(theta_i, 0.0);
+            Sample::new(light, Direction::from_deg(theta_v, phi_v), [value; 3])
+        };
+        let samples: Vec<Sample> = (0..8)
+            .map(|k| {
+                let theta = 20.0 + f64::from(k);
+                match k % 2 {
+                    0 => at(theta, theta + 15.0, 70.0, 3.0),
+                    _ => at(theta, theta, 180.0, -1.0),
+                }
+            })
+            .collect();
+        let settings = Settings {
+            symmetry: Symmetry::HalfTurn,
+            nugget: 1e3,
+            ..Settings::DEFAULT
+        };
+        let fit = ScatteredFit::with_settings(&samples, settings).unwrap();
+        let (value, _) = fit.at(
+            Direction::from_deg(25.0, 0.0),
+            Direction::from_deg(30.0, 90.0),
+        );
+        assert!((value[0] - 1.0).abs() < 0.1, "{value:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use super::Settings;
 use super::places::Near;
-use super::wide::{Axes, Correlations, Covariance, dot};
+use super::wide::{Axes, Correlations, Covariance, Noise, dot};
 use crate::elementary::Elementary;
 use pulp::Arch;
 
@@ -25,7 +25,7 @@ struct Subset {
     arch: Arch,
     correlations: Correlations,
     values: Vec<f64>,
-    noise: Vec<f64>,
+    noise: Noise,
     /// The nugget in any case.
     least: f64,
 }
@@ -34,7 +34,7 @@ impl Subset {
     fn new(
         arch: Arch,
         near: &[Near],
-        (values, noise): (&[f64], &[f64]),
+        (values, noise): (&[f64], &Noise),
         covariance: Covariance,
         settings: &Settings,
         every: usize,
@@ -44,7 +44,7 @@ impl Subset {
             arch,
             correlations: Correlations::new(arch, &at, covariance),
             values: values.iter().step_by(every).copied().collect(),
-            noise: noise.iter().step_by(every).copied().collect(),
+            noise: noise.step_by(every),
             least: settings.nugget,
         }
     }
@@ -72,7 +72,7 @@ impl Subset {
 pub(super) fn likely_nugget(
     arch: Arch,
     near: &[Near],
-    data: (&[f64], &[f64]),
+    data: (&[f64], &Noise),
     covariance: Covariance,
     settings: &Settings,
 ) -> f64 {
@@ -112,7 +112,7 @@ pub(super) fn likely_nugget(
 pub(super) fn largest_nugget(
     arch: Arch,
     near: &[Near],
-    data: (&[f64], &[f64]),
+    data: (&[f64], &Noise),
     covariance: Covariance,
     settings: &Settings,
 ) -> f64 {

@@ -7,6 +7,7 @@ use crate::dense::DenseBrdf;
 use crate::direction::Direction;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
+use crate::symmetry::Symmetry;
 use rayon::prelude::*;
 
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
@@ -48,12 +49,18 @@ impl ScatteredFit {
 impl Table {
     fn new(fit: &ScatteredFit, grid: Grid, with_errors: bool) -> Self {
         let size = [grid.n_theta(), grid.n_theta(), grid.n_phi()];
+        // Where both sides of the plane of incidence are alike, one is fitted.
+        let is_mirrored = fit.choice.settings.symmetry == Symmetry::Isotropic;
+        let fitted = match is_mirrored {
+            true => [size[0], size[1], size[2] / 2 + 1],
+            false => size,
+        };
         let mut parts = Vec::new();
-        for i in (0..size[0]).step_by(BLOCK) {
-            for v in (0..size[1]).step_by(BLOCK) {
-                for d in (0..size[2]).step_by(BLOCK) {
+        for i in (0..fitted[0]).step_by(BLOCK) {
+            for v in (0..fitted[1]).step_by(BLOCK) {
+                for d in (0..fitted[2]).step_by(BLOCK) {
                     let start = [i, v, d];
-                    let end = [0, 1, 2].map(|k| (start[k] + BLOCK).min(size[k]));
+                    let end = [0, 1, 2].map(|k| (start[k] + BLOCK).min(fitted[k]));
                     parts.push(Part { start, end });
                 }
             }
@@ -81,6 +88,13 @@ impl Table {
         let mut cells = vec![nothing; size.iter().product()];
         for (cell, predicted) in found.into_iter().flatten() {
             cells[cell] = predicted;
+        }
+        if is_mirrored {
+            for row in cells.chunks_exact_mut(size[2]) {
+                for d in fitted[2]..size[2] {
+                    row[d] = row[size[2] - d];
+                }
+            }
         }
         Self { grid, cells }.reciprocal()
     }

@@ -45,6 +45,32 @@ pub(super) struct Covariance {
     pub scale: f64,
 }
 
+/// The noise of the data of a system, over that of one sample.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Noise {
+    /// Of each datum.
+    pub variances: Vec<f64>,
+    /// Images of one datum, the earlier first: they have their noise in common.
+    pub same: Vec<(usize, usize)>,
+}
+
+impl Noise {
+    /// Of every so manieth datum.
+    pub fn step_by(&self, every: usize) -> Self {
+        let kept = |k: usize| k.is_multiple_of(every).then_some(k / every);
+        let same = self.same.iter();
+        Self {
+            variances: self.variances.iter().step_by(every).copied().collect(),
+            same: same
+                .filter_map(|(i, j)| Some((kept(*i)?, kept(*j)?)))
+                .collect(),
+        }
+    }
+}
+
+/// So much of the noise of images of one datum is in common: what is left keeps a system apart from singular.
+const IN_COMMON: f64 = 0.999;
+
 /// The covariances of places with each other, over the variance of the process: the lower half of K, column by column.
 pub(super) struct Correlations {
     n: usize,
@@ -64,10 +90,13 @@ impl Correlations {
     }
 
     /// The factor of `K + nugget · noise`; `None` where that is singular to this precision.
-    pub fn factor(&self, arch: Arch, nugget: f64, noise: &[f64]) -> Option<Factor> {
+    pub fn factor(&self, arch: Arch, nugget: f64, noise: &Noise) -> Option<Factor> {
         let mut l = self.k.clone();
-        for (j, noise) in noise.iter().enumerate() {
-            l[j * (self.n + 1)] = 1.0 + nugget * noise;
+        for (j, variance) in noise.variances.iter().enumerate() {
+            l[j * (self.n + 1)] = 1.0 + nugget * variance;
+        }
+        for (i, j) in &noise.same {
+            l[i * self.n + j] += IN_COMMON * nugget * noise.variances[*i];
         }
         arch.dispatch(Factored(self.n, &mut l))
             .then_some(Factor { n: self.n, l })
@@ -393,11 +422,15 @@ mod tests {
         assert!(decay(f64::INFINITY) > 0.0 && decay(1e9) < 1e-300);
     }
 
-    fn system(n: usize) -> (Axes, Vec<f64>) {
+    fn system(n: usize) -> (Axes, Noise) {
         let mut random = Random::new(9);
         let places = (0..n).map(|_| [0; 6].map(|_| random.between(-1.0, 1.0)));
         let at = Axes::of(places.collect::<Vec<_>>().into_iter());
-        (at, (0..n).map(|k| f64::from(k as u32 % 3 + 1)).collect())
+        let variances = (0..n).map(|k| f64::from(k as u32 % 3 + 1)).collect();
+        // The first and the fourth of every seven are of one datum.
+        let same = (0..n.saturating_sub(3)).step_by(7).map(|k| (k, k + 3));
+        let same = same.collect();
+        (at, Noise { variances, same })
     }
 
     #[test]
@@ -415,7 +448,14 @@ mod tests {
                 let mut k = Vec::new();
                 for i in 0..n {
                     covariances(Arch::new(), &at, covariance, &at.place(i), &mut k);
-                    k[i] += 1e-3 * noise[i];
+                    k[i] += 1e-3 * noise.variances[i];
+                    for (a, b) in &noise.same {
+                        for (own, other) in [(a, b), (b, a)] {
+                            if *own == i {
+                                k[*other] += 1e-3 * IN_COMMON * noise.variances[i];
+                            }
+                        }
+                    }
                     let back = dot(Arch::new(), &k, &x);
                     assert!((back - y[i]).abs() < 1e-8, "{n} {i}: {back} {}", y[i]);
                 }
@@ -426,8 +466,11 @@ mod tests {
                     covariance,
                 };
                 filled.with_simd(pulp::Scalar);
-                for (j, noise) in noise.iter().enumerate() {
+                for (j, noise) in noise.variances.iter().enumerate() {
                     narrow[j * (n + 1)] = 1.0 + 1e-3 * noise;
+                }
+                for (i, j) in &noise.same {
+                    narrow[i * n + j] += IN_COMMON * 1e-3 * noise.variances[*i];
                 }
                 assert!(Factored(n, &mut narrow).with_simd(pulp::Scalar));
                 assert!(narrow == factor.l);

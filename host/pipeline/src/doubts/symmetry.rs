@@ -1,7 +1,7 @@
 //! What a fit of few samples takes of them, where they cannot show it or speak against it.
 
 use super::SAMPLES;
-use gonia_brdf::scattered::ScatteredFit;
+use gonia_brdf::scattered::{Reason, ScatteredFit};
 use gonia_rig::Remark;
 
 /// What is to be said of the symmetry and the settings of a fit.
@@ -22,13 +22,20 @@ pub(crate) fn remarks(fit: &ScatteredFit) -> Vec<Remark> {
         ));
     }
     if choice.log_error.is_none() {
+        let (assumed, remedy) = match choice.reason {
+            Reason::TooFew => (
+                ", the material is assumed to be isotropic",
+                "measure more directions; if it is not isotropic, give --symmetry none",
+            ),
+            _ => ("", "measure more directions"),
+        };
         remarks.push(Remark::new(
             SAMPLES,
             format_args!(
-                "lie at {} places, too few to choose settings by cross-validation: simple ones are taken, and standard errors are a guess",
+                "lie at {} places, too few to choose settings by cross-validation: simple ones are taken{assumed}, and standard errors are a guess",
                 fit.places()
             ),
-            "measure more directions",
+            remedy,
         ));
     }
     remarks
