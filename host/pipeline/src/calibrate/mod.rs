@@ -71,7 +71,7 @@ const LEAST_MISFIT_PX: f64 = 0.3;
 /// Frames of the first steps, whose camera is not known well yet: this share of the width.
 const FIRST_MISFIT_WIDTHS: f64 = 8e-3;
 /// More than this share of frames that do not fit are another rig's.
-pub(crate) const MISFITS: f64 = 0.15;
+pub(crate) const MISFITS: f64 = 0.1;
 
 /// A calibrated rig, and what speaks for it.
 #[derive(Clone, Debug)]
