@@ -270,6 +270,11 @@ fn no_setting_has_ever_changed_its_number_or_its_unit() {
         "29 gear_sin µdeg",
         "30 motor_reversed",
         "31 encoder_reversed",
+        "32 home_probe µdeg",
+        "33 home_normally_closed",
+        "34 driver_alarm",
+        "35 brake_time µs",
+        "36 encoder_kind",
     ];
     assert_eq!(listed, frozen);
 }

@@ -143,7 +143,7 @@ pub enum RegistrationFailure {
     /// The lines found are those of the target, but all of it is elsewhere in the frame.
     #[error(
         "the target is seen {:+.1} pixels to the right and {:+.1} down from there",
-        .shift_px[0], .shift_px[1]
+        tenths(.shift_px[0]), tenths(.shift_px[1])
     )]
     Displaced {
         /// How far right and down of its place the target is, pixels.
@@ -176,6 +176,11 @@ pub enum RegistrationFailure {
         /// Angle between reading and estimate.
         offset_deg: f64,
     },
+}
+
+/// Rounded to what is printed, without the sign of nothing: that depends on the processor.
+fn tenths(px: f64) -> f64 {
+    (10.0 * px).round() / 10.0 + 0.0
 }
 
 impl Registration {
