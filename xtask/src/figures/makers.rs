@@ -159,6 +159,13 @@ pub const FIGURES: &[Figure] = &[
         "cargo bench -p gonia --bench accuracy -- cost --out {work}",
     )])
     .with(&[("accuracy_cost.svg", "accuracy_cost.svg")]),
+    figure("calibration", 10.0, Tables, &[run(
+        "cargo bench -p gonia --bench calibration -- --out {work}",
+    )])
+    .with(&[("calibration.svg", "calibration.svg")]),
+    figure("calibration-fails", 2.0, Tables, &[run(
+        "cargo test --release -p gonia-pipeline --test calibration where -- --ignored --nocapture",
+    )]),
     figure("hough", 1.0, Tables, &[run("cargo bench -p gonia --bench accuracy -- hough")]),
     figure("photograph", 0.1, Text, &[run(
         "cargo test --release -p gonia-imaging --lib -- --nocapture lines_in_a_photograph",
