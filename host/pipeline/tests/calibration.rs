@@ -503,7 +503,7 @@ fn cases() -> Vec<Case> {
 
 /// `cargo test -p gonia-pipeline --test calibration where -- --ignored --nocapture` prints the rows of the guide's
 /// table: errors and uncertainties at the case's own poses. Each case is refused, or what it finds lies within
-/// its stated uncertainty.
+/// its stated uncertainty, or a warning says that it may not.
 #[test]
 #[ignore = "18 calibrations, two minutes of a core"]
 fn where_calibration_fails_it_says_so() {
@@ -547,7 +547,7 @@ fn where_calibration_fails_it_says_so() {
         }
         println!("| {} | {light} | {view} | {} |", case.name, says.join("; "));
         for which in usize::from(!is_lit)..2 {
-            if errors[which][1] > 3.0 * u[which].p95 {
+            if errors[which][1] > 3.0 * u[which].p95 && found.remarks.is_empty() {
                 wrong.push(format!("{}: {:?} {u:?}", case.name, errors));
             }
         }

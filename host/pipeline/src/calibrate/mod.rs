@@ -72,6 +72,8 @@ const LEAST_MISFIT_PX: f64 = 0.3;
 const FIRST_MISFIT_WIDTHS: f64 = 8e-3;
 /// More than this share of frames that do not fit are another rig's.
 pub(crate) const MISFITS: f64 = 0.1;
+/// Where fewer of the frames than this share show the target where the found camera sees it, that is said.
+const SHOWN: f64 = 0.75;
 
 /// A calibrated rig, and what speaks for it.
 #[derive(Clone, Debug)]
@@ -609,6 +611,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let mut remarks = seen.remarks;
     remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
     remarks.extend(light.remark());
+    remarks.extend(few_shown(looked_at, lines.len()));
     let found = light.rig(&with_camera);
 
     let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
@@ -684,6 +687,17 @@ fn direction_u_of_light_as_it_was(
         joined[(n + k, n + k)] = prior * prior;
     }
     direction_u(rig, &[&CAMERA, &LIGHT], &numbers, &joined, poses)
+}
+
+/// That many frames do not bear the found camera out: of few frames a wrong one can fit those that do.
+fn few_shown(looked_at: usize, shown: usize) -> Option<Remark> {
+    ((shown as f64) < SHOWN * looked_at as f64).then(|| {
+        Remark::new(
+            format_args!("{} of {looked_at} frames", looked_at - shown),
+            "they do not show the fiducial lines where the camera that was found sees them: it may be wrong by more than its uncertainties say",
+            "look at one of them; take more frames, some from above, and calibrate again",
+        )
+    })
 }
 
 /// The calibration as `rig.toml` keeps it, without its date.
