@@ -547,7 +547,8 @@ fn where_calibration_fails_it_says_so() {
         }
         println!("| {} | {light} | {view} | {} |", case.name, says.join("; "));
         for which in usize::from(!is_lit)..2 {
-            if errors[which][1] > 3.0 * u[which].p95 && found.remarks.is_empty() {
+            let is_warned = says.iter().any(|said| said.contains("it may be wrong"));
+            if errors[which][1] > 3.0 * u[which].p95 && !is_warned {
                 wrong.push(format!("{}: {:?} {u:?}", case.name, errors));
             }
         }
