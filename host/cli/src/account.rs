@@ -1,7 +1,37 @@
 //! What came of the frames: rows of a command's table.
 
 use crate::table;
+use gonia_pipeline::budget::budget_of;
 use gonia_pipeline::process::{Outcome, Processed, ReferenceCalibration};
+use gonia_rig::{Input, KnownFrom, Rig};
+
+/// From what the uncertainty of the samples follows beside their scatter: what nobody stated stands apart.
+pub fn uncertainties(rig: &Rig, processed: &Processed) -> Vec<(String, String)> {
+    let budget = budget_of(rig, processed.calibration, &processed.samples);
+    let is_absolute = processed.calibration.is_absolute();
+    let of = |from: KnownFrom| {
+        let all = Input::ALL.into_iter();
+        let counted = all.filter(|input| is_absolute || !input.key().starts_with("reference."));
+        let known = counted.filter(|input| budget.known_from(*input) == from);
+        let text = known.map(|input| {
+            let digits = if budget.value(input) < 0.01 { 4 } else { 3 };
+            let value = format!("{:.digits$}", budget.value(input));
+            format!("{} {value} {}", input.key(), input.unit())
+                .trim_end()
+                .to_owned()
+        });
+        text.collect::<Vec<_>>().join(", ")
+    };
+    let row = |name: &str, text: String| (!text.is_empty()).then(|| (name.to_owned(), text));
+    [
+        row("u (k = 1), stated", of(KnownFrom::Stated)),
+        row("u, by calibration", of(KnownFrom::Calibration)),
+        row("u, nobody stated", of(KnownFrom::Default)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
 
 /// What came of the frames, for the table.
 pub fn describe(processed: &Processed) -> Vec<(String, String)> {

@@ -8,7 +8,7 @@ use gonia_formats::samples::{check_sample_name, write_noted_samples};
 use gonia_formats::{CaptureFolder, check_output};
 use gonia_pipeline::process::{MASKS, Masks};
 use gonia_pipeline::samples_of;
-use gonia_rig::rig_remarks;
+use gonia_rig::{remark_on_certificate, rig_remarks};
 use std::path::PathBuf;
 
 /// Registers each frame by its fiducial lines, samples it, and calibrates it against the reference.
@@ -60,15 +60,19 @@ impl Process {
             let processed = samples_of(folder.rig(), &folder, &masks, &progress.watch())?;
             (folder.rig().clone(), processed, facts)
         };
-        remarks::print(&rig_remarks(self.folder.join(RIG).display(), &rig));
+        let place = self.folder.join(RIG);
+        remarks::print(&rig_remarks(place.display(), &rig));
+        let today = sample_facts::today();
+        remarks::print(remark_on_certificate(place.display(), &rig, &today).as_slice());
         remarks::print(&processed.remarks);
         progress.stage("writing samples", |_| {
-            write_noted_samples(&output, &processed.samples, &processed.note(facts))
+            write_noted_samples(&output, &processed.samples, &processed.note(&rig, facts))
         })?;
         if !processed.masks.is_empty() {
             processed.masks.write(&output.with_file_name(MASKS), &rig)?;
         }
         let mut rows = account::describe(&processed);
+        rows.extend(account::uncertainties(&rig, &processed));
         rows.push(("written".into(), output.display().to_string()));
         table::print(&rows);
         Ok(())

@@ -1,6 +1,6 @@
 //! Where samples came from, as the note of their file says it.
 
-use gonia_acquire::session::{RIG, SessionFolder};
+use gonia_acquire::session::{RIG, SessionFolder, now};
 use gonia_formats::{FileError, checksum};
 use gonia_pipeline::provenance::Provenance;
 use std::path::Path;
@@ -36,6 +36,11 @@ pub fn of_capture_folder(made_by: &str, folder: &Path) -> Result<Provenance, Fil
     let mut facts = made_by_facts(made_by, folder);
     facts.insert("rig".to_owned(), format!("{RIG}, checksum {rig}"));
     Ok(facts)
+}
+
+/// This day, as `2027-03-31`.
+pub fn today() -> String {
+    now().chars().take_while(|c| *c != 'T').collect()
 }
 
 fn made_by_facts(made_by: &str, folder: &Path) -> Provenance {

@@ -36,7 +36,7 @@ fn scene() -> Scene {
 /// A capture folder of brackets of both poses and roles; `pattern` as for a Bayer sensor, else RGB.
 fn write_folder(folder: &Path, pattern: Option<Bayer>, times: &[f64]) {
     let mut rig = Rig::paper(PX);
-    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    rig.reference = Some(Reference::lambertian(ALBEDO));
     rig.sensor = Some(Sensor {
         black_counts: 64.0,
         saturation_counts: 3900.0,

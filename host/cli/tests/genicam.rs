@@ -39,7 +39,7 @@ fn alone() -> MutexGuard<'static, ()> {
 
 fn rig() -> Rig {
     let mut rig = small_rig();
-    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    rig.reference = Some(Reference::lambertian(ALBEDO));
     rig.sensor = Some(Sensor {
         black_counts: 64.0,
         saturation_counts: 3900.0,

@@ -53,7 +53,7 @@ static FRAMES: LazyLock<Vec<[Frame; 2]>> = LazyLock::new(|| {
 
 fn rig() -> Rig {
     let mut rig = Rig::paper(PX);
-    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    rig.reference = Some(Reference::lambertian(ALBEDO));
     rig.sensor = Some(sensor(None));
     rig
 }

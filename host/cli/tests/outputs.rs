@@ -649,7 +649,7 @@ fn rigs(bench: &mut Bench) {
         (98.0, 1, Some("may be a percentage")),
     ] {
         let rig = Rig {
-            reference: Some(Reference::Reflectance([0.99, rho, 0.99])),
+            reference: Some(Reference::lambertian([0.99, rho, 0.99])),
             ..Rig::paper(240)
         };
         write_rig(&bench.at("rig.toml"), &rig).unwrap();

@@ -2,7 +2,7 @@
 
 use crate::reflectance_csv::read_reflectance;
 use crate::{FileError, toml_text, write_whole_bytes};
-use gonia_rig::{Reference, Rig, check_rig};
+use gonia_rig::{Reflectance, Rig, check_rig};
 use std::path::Path;
 
 const REMEDY: &str = "docs/src/reference/files/rig.md has the keys and their units";
@@ -15,7 +15,8 @@ const REMEDY: &str = "docs/src/reference/files/rig.md has the keys and their uni
 /// reflectance above 1.1).
 pub fn read_rig(path: &Path) -> Result<Rig, FileError> {
     let mut rig: Rig = toml_text::read(path, REMEDY)?;
-    if let Some(Reference::Table { file, table }) = &mut rig.reference {
+    let reflectance = rig.reference.as_mut().map(|of| &mut of.reflectance);
+    if let Some(Reflectance::Table { file, table }) = reflectance {
         *table = read_reflectance(&path.with_file_name(&*file))?;
     }
     check_rig(&rig).map_err(|wrong| {
@@ -37,7 +38,7 @@ pub fn write_rig(path: &Path, rig: &Rig) -> Result<(), FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_rig::{Bayer, ReflectanceTable, Sensor, Source};
+    use gonia_rig::{Bayer, Reference, ReflectanceTable, Sensor, Source};
 
     fn read_text(text: &str) -> Result<Rig, FileError> {
         let dir = tempfile::tempdir().unwrap();
@@ -56,7 +57,7 @@ mod tests {
         let path = dir.path().join("rig.toml");
         let mut rig = Rig::paper(400);
         rig.camera.k1 = -0.02;
-        rig.reference = Some(Reference::Reflectance([0.99, 0.98, 1.0]));
+        rig.reference = Some(Reference::lambertian([0.99, 0.98, 1.0]));
         rig.sensor = Some(Sensor {
             black_counts: 64.0,
             saturation_counts: 4000.0,
@@ -74,7 +75,7 @@ mod tests {
         let (_, rest) = page.split_once("```toml\n").unwrap();
         let (text, _) = rest.split_once("```").unwrap();
         let mut paper = Rig::paper(1024);
-        paper.reference = Some(Reference::Reflectance([0.99; 3]));
+        paper.reference = Some(Reference::lambertian([0.99; 3]));
         assert_eq!(read_text(text).unwrap(), paper);
     }
 
@@ -116,10 +117,10 @@ mod tests {
         assert!(error.contains("white.csv: cannot be read"), "{error}");
         std::fs::write(dir.path().join("white.csv"), "theta_i,r,g,b\n8,1,0.9,1\n").unwrap();
         let rig = read("table = \"white.csv\"").unwrap();
-        let expected = Reference::Table {
+        let expected = Reference::from(Reflectance::Table {
             file: "white.csv".into(),
             table: ReflectanceTable::ByIncidence(vec![(8.0, [1.0, 0.9, 1.0])]),
-        };
+        });
         assert_eq!(rig.reference, Some(expected));
         write_rig(&path, &rig).unwrap();
         assert_eq!(read_rig(&path).unwrap(), rig);

@@ -30,6 +30,7 @@ mod accumulate;
 pub mod baselines;
 pub mod bracket;
 mod bracket_sensor;
+pub mod budget;
 pub mod calibrate;
 pub mod chart;
 mod colours;

@@ -1,6 +1,7 @@
 //! Frames → samples: of a capture folder, or of any [`FrameSource`].
 
 use crate::Error;
+use crate::budget::{UNCERTAINTIES, budget_of};
 use crate::process::{
     FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, ReferenceCalibration,
     Sampled, process, process_sampled, rig_check,
@@ -109,9 +110,9 @@ impl Processed {
         }
     }
 
-    /// What a file of the samples says of them: their scale, how they were calibrated, this program, and
-    /// `facts` of the caller's.
-    pub fn note(&self, facts: Provenance) -> SampleNote {
+    /// What a file of the samples of a rig says of them: their scale, how they were calibrated and from what their
+    /// uncertainty follows ([`budget`](crate::budget)), this program, and `facts` of the caller's.
+    pub fn note(&self, rig: &Rig, facts: Provenance) -> SampleNote {
         let calibration = match self.calibration {
             ReferenceCalibration::KnownReference => "against the known reference",
             ReferenceCalibration::UnknownReference => "against the unknown reference, eq. (3)",
@@ -119,6 +120,25 @@ impl Processed {
         };
         let mut provenance = of_this_program();
         provenance.insert("calibration".to_owned(), calibration.to_owned());
+        let budget = budget_of(rig, self.calibration, &self.samples);
+        provenance.insert(UNCERTAINTIES.to_owned(), budget.to_string());
+        if let Some(reference) = rig
+            .reference
+            .as_ref()
+            .filter(|_| self.calibration.is_absolute())
+        {
+            let of = &reference.certificate;
+            let known = [
+                ("certificate", &of.certificate),
+                ("valid_until", &of.valid_until),
+            ];
+            for (name, text) in known {
+                let named = text
+                    .iter()
+                    .map(|text| (format!("reference.{name}"), text.clone()));
+                provenance.extend(named);
+            }
+        }
         provenance.extend(facts);
         SampleNote {
             scale: Some(self.scale()),

@@ -171,7 +171,7 @@ fn lambertian(px: usize) -> (Rendered, Rig) {
     let mut scene = Scene::of_fabric(px);
     scene.reference = Arc::new(Kurt::new(ALBEDO, &[]));
     let mut rig = scene.geometry.to_rig();
-    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    rig.reference = Some(Reference::lambertian(ALBEDO));
     let mut source = Rendered::new(scene);
     for angles in POSES {
         source.add(Role::Reference, angles);
@@ -469,7 +469,7 @@ fn masks_of_a_references_frames_serve_a_material_without_them() {
     with_reference.add(Role::Reference, hidden);
     with_reference.add(Role::Material, hidden);
     let mut known = rig.clone();
-    known.reference = Some(Reference::Reflectance([0.5; 3]));
+    known.reference = Some(Reference::lambertian([0.5; 3]));
     let first = process(&known, &with_reference, &Masks::default(), &|_, _| {
         ControlFlow::Continue(())
     })
@@ -506,10 +506,10 @@ fn a_reference_with_a_table_gives_absolute_values_by_its_directions() {
         (40.0, ALBEDO),
         (58.0, ALBEDO.map(|a| 2.0 * a)),
     ];
-    rig.reference = Some(Reference::Table {
+    rig.reference = Some(Reference::from(Reflectance::Table {
         file: "white.csv".into(),
         table: ReflectanceTable::ByIncidence(rows),
-    });
+    }));
     let done = process(&rig, &source, &Masks::default(), &|_, _| {
         ControlFlow::Continue(())
     })
@@ -568,7 +568,7 @@ fn a_break_ends_the_work() {
 /// plan; and the rig that it is said to be.
 fn crooked(px: usize, poses: usize, change: impl Fn(&mut Rig)) -> (Rendered, Rig) {
     let mut rig = Rig::paper(px);
-    rig.reference = Some(Reference::Reflectance(ALBEDO));
+    rig.reference = Some(Reference::lambertian(ALBEDO));
     let mut built = rig.clone();
     change(&mut built);
     let mut scene = Scene::of_fabric(px);

@@ -2,8 +2,9 @@
 
 use crate::bench_setup::{Source, check_bench};
 use crate::rig_error::within;
+use crate::uncertainty::check_uncertainties;
 use crate::{
-    ArmGeometry, Calibration, CameraGeometry, CameraModel, LightGeometry, Reference, Remark, Rig,
+    ArmGeometry, Calibration, CameraGeometry, CameraModel, LightGeometry, Reflectance, Remark, Rig,
     RigError, Sampling, Sensor, Target,
 };
 use gonia_brdf::Elementary;
@@ -29,11 +30,12 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
         check_simulated(&rig.camera, rig.source.as_ref())?;
     }
     check_target(&rig.target)?;
-    if let Some(Reference::Reflectance(reflectance)) = &rig.reference {
+    if let Some(Reflectance::Lambertian(reflectance)) = reflectance_of(rig) {
         for rho in *reflectance {
             check_reflectance(rho)?;
         }
     }
+    check_uncertainties(rig)?;
     if let Some(sensor) = &rig.sensor {
         check_sensor(sensor)?;
     }
@@ -53,6 +55,10 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
     )
 }
 
+fn reflectance_of(rig: &Rig) -> Option<&Reflectance> {
+    rig.reference.as_ref().map(|of| &of.reflectance)
+}
+
 /// Most that a reference reflects of the light, a channel: real tiles, whose factor is against an ideal
 /// diffuser, come out a little above 1 in one.
 const REFLECTANCE_MAX: f64 = 1.1;
@@ -69,7 +75,7 @@ fn check_reflectance(rho: f64) -> Result<(), RigError> {
 
 /// What is to be said of a rig that was read from `file` and may be used all the same.
 pub fn rig_remarks(file: impl std::fmt::Display, rig: &Rig) -> Vec<Remark> {
-    let Some(Reference::Reflectance(reflectance)) = &rig.reference else {
+    let Some(Reflectance::Lambertian(reflectance)) = reflectance_of(rig) else {
         return Vec::new();
     };
     let above = reflectance.iter().copied().filter(|rho| *rho > 1.0);
@@ -86,6 +92,28 @@ pub fn rig_remarks(file: impl std::fmt::Display, rig: &Rig) -> Vec<Remark> {
         })
         .into_iter()
         .collect()
+}
+
+/// What is to be said of a reference whose certificate has run out by a day, written as `2027-03-31`.
+pub fn remark_on_certificate(
+    file: impl std::fmt::Display,
+    rig: &Rig,
+    today: &str,
+) -> Option<Remark> {
+    let certificate = &rig.reference.as_ref()?.certificate;
+    let until = certificate.valid_until.as_deref()?;
+    // Days that are written so stand in the order of their letters.
+    (until < today).then(|| {
+        let named = certificate.certificate.as_deref();
+        Remark::new(
+            format_args!("{file}, key reference.valid_until"),
+            format_args!(
+                "the reference was to be relied on until {until}{}, and today is {today}",
+                named.map_or(String::new(), |name| format!(" ({name})"))
+            ),
+            "have it calibrated again, or give it a larger u",
+        )
+    })
 }
 
 fn check_camera(camera: &CameraGeometry) -> Result<(), RigError> {
@@ -356,10 +384,11 @@ fn check_sensor(sensor: &Sensor) -> Result<(), RigError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Reference;
 
     fn rig_of(reflectance: [f64; 3]) -> Rig {
         Rig {
-            reference: Some(Reference::Reflectance(reflectance)),
+            reference: Some(Reference::lambertian(reflectance)),
             ..Rig::paper(400)
         }
     }
@@ -376,6 +405,21 @@ mod tests {
             said.starts_with("rig.toml, key reference.reflectance: 1.02 is more"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_certificate_that_has_run_out_is_said() {
+        let mut rig = rig_of([0.99; 3]);
+        let said = |rig: &Rig, today| remark_on_certificate("rig.toml", rig, today);
+        assert_eq!(said(&rig, "2027-04-01"), None);
+        if let Some(reference) = &mut rig.reference {
+            reference.certificate.valid_until = Some("2027-03-31".into());
+            reference.certificate.certificate = Some("PTB 12345".into());
+        }
+        assert_eq!(said(&rig, "2027-03-31"), None);
+        let remark = said(&rig, "2027-04-01").map(|remark| remark.to_string());
+        let remark = remark.unwrap_or_default();
+        assert!(remark.contains("until 2027-03-31 (PTB 12345)"), "{remark}");
     }
 
     #[test]

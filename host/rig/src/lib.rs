@@ -6,6 +6,8 @@
 //! | [`Rig`] and its parts | geometry, sensor, reference, sampling, as `rig.toml` has them |
 //! | [`ArmPorts`], [`Source`], [`SessionSettings`], [`Genicam`] | the bench setup of a session |
 //! | [`ArmGeometry`], [`TargetPlace`], [`Placement`] | arms and target as they were built, and where light and camera stand |
+//! | [`Reference`], [`Uncertainties`], [`Input`] | what the reference reflects, and how well is known what frames do not tell |
+//! | [`Budget`], [`ReferenceCalibration`] | what the uncertainty of a data set follows from |
 //! | [`Calibration`] | what a calibration of the geometry found, and how well |
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
@@ -17,6 +19,7 @@
 
 mod arm_geometry;
 mod bench_setup;
+mod budget;
 mod calibration;
 mod camera_model;
 mod cell_mask;
@@ -33,6 +36,7 @@ mod homography;
 mod number;
 mod pixel_format;
 mod raw_frame;
+mod reference;
 mod remark;
 mod rig;
 mod rig_error;
@@ -41,15 +45,17 @@ mod scale;
 mod sensor;
 mod sound_samples;
 pub mod stratum;
+mod uncertainty;
 
 pub use arm_geometry::{ArmGeometry, Placement, TargetPlace};
 pub use bench_setup::{ArmPorts, DEFAULT_BAUD, SessionSettings, Source, Thermometer};
+pub use budget::{Budget, NoBudget, ReferenceCalibration};
 pub use calibration::Calibration;
 pub use camera_model::{CameraModel, CameraShift};
 pub use cell_mask::CellMask;
 pub use channel_samples::ChannelSamples;
 pub use channels::{Channels, SameBand};
-pub use check::{check_rig, rig_remarks};
+pub use check::{check_rig, remark_on_certificate, rig_remarks};
 pub use dense::DenseFile;
 pub use dense_channels::DenseChannels;
 pub use figures::{Figures, StratumFigures};
@@ -59,14 +65,13 @@ pub use genicam::{ExposureTiming, Genicam};
 pub use homography::Homography;
 pub use pixel_format::PixelFormat;
 pub use raw_frame::RawFrame;
+pub use reference::{Certificate, Reference, Reflectance, ReflectanceTable};
 pub use remark::Remark;
-pub use rig::{
-    CameraGeometry, CameraMount, LightGeometry, OrientationMark, Reference, ReflectanceTable, Rig,
-    Sampling, Target,
-};
+pub use rig::{CameraGeometry, CameraMount, LightGeometry, OrientationMark, Rig, Sampling, Target};
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;
 pub use scale::Scale;
 pub use sensor::{Bayer, Sensor};
 pub use sound_samples::{Oddities, Oddity, keep_sound};
 pub use stratum::Stratum;
+pub use uncertainty::{Input, KnownFrom, Uncertainties};

@@ -4,8 +4,10 @@ use crate::arm_geometry::Placement;
 use crate::arm_geometry::{ArmGeometry, TargetPlace};
 use crate::bench_setup::{ArmPorts, SessionSettings, Source};
 use crate::calibration::Calibration;
+use crate::reference::Reference;
 use crate::sensor::Sensor;
-use gonia_brdf::{Direction, Pose};
+use crate::uncertainty::Uncertainties;
+use gonia_brdf::Direction;
 use serde::{Deserialize, Serialize};
 
 /// The geometry of a rig and how its frames are sampled.
@@ -35,6 +37,9 @@ pub struct Rig {
     /// How a session goes, where it differs from the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<SessionSettings>,
+    /// How well is known what frames do not tell, where that differs from the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainties>,
     /// How well the geometry is known, where it was calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,
@@ -149,65 +154,6 @@ impl Target {
     }
 }
 
-/// A reference of known reflectance: either `reflectance` or `table` in `rig.toml`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
-pub enum Reference {
-    /// A Lambertian one: reflectance factor per channel, 0 < ρ ≤ 1.1.
-    Reflectance([f64; 3]),
-    /// One whose reflectance depends on direction.
-    Table {
-        /// The table's CSV, relative to the rig's folder.
-        file: String,
-        /// Its rows, once `gonia_formats::rig_toml::read_rig` has read them.
-        table: ReflectanceTable,
-    },
-}
-
-/// Reflectance factors (π times the BRDF) by direction; never empty in a rig that was read.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ReflectanceTable {
-    /// By θi in degrees, in order.
-    ByIncidence(Vec<(f64, [f64; 3])>),
-    /// By light and view. A reference is taken as isotropic and reciprocal.
-    ByPose(Vec<(Pose, [f64; 3])>),
-}
-
-/// The keys of `[reference]`.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ReferenceKeys {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    reflectance: Option<[f64; 3]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    table: Option<String>,
-}
-
-impl TryFrom<ReferenceKeys> for Reference {
-    type Error = &'static str;
-
-    fn try_from(keys: ReferenceKeys) -> Result<Self, Self::Error> {
-        match (keys.reflectance, keys.table) {
-            (Some(rho), None) => Ok(Self::Reflectance(rho)),
-            (None, Some(file)) => Ok(Self::Table {
-                file,
-                table: ReflectanceTable::ByIncidence(Vec::new()),
-            }),
-            _ => Err("[reference] needs either reflectance or table"),
-        }
-    }
-}
-
-impl From<Reference> for ReferenceKeys {
-    fn from(reference: Reference) -> Self {
-        let (reflectance, table) = match reference {
-            Reference::Reflectance(rho) => (Some(rho), None),
-            Reference::Table { file, .. } => (None, Some(file)),
-        };
-        Self { reflectance, table }
-    }
-}
-
 /// The sampling points of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -272,6 +218,7 @@ impl Rig {
             arms: None,
             source: None,
             session: None,
+            uncertainty: None,
             calibration: None,
         }
     }

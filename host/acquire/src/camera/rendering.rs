@@ -3,7 +3,7 @@
 use crate::camera::source::{Camera, CameraError, Pulse};
 use gonia_brdf::Vec3;
 use gonia_brdf::model::{Brdf, Kurt};
-use gonia_rig::{Frame, FrameRow, Reference, Rig, Role};
+use gonia_rig::{Frame, FrameRow, Reflectance, Rig, Role};
 use gonia_sim::rig::SimRig;
 use gonia_sim::scene::{Scene, SceneGeometry};
 use std::sync::Arc;
@@ -21,8 +21,8 @@ impl RenderingCamera {
     /// reference and material apart. An exact camera renders the pose of the arms' reading, not that of
     /// the true shafts.
     pub fn new(rig: &Rig, arms: SimRig, seed: u64, planned: usize, exact: bool) -> Self {
-        let reference: Arc<dyn Brdf> = match rig.reference {
-            Some(Reference::Reflectance(albedo)) => Arc::new(Lambertian(albedo)),
+        let reference: Arc<dyn Brdf> = match rig.reference.as_ref().map(|of| &of.reflectance) {
+            Some(Reflectance::Lambertian(albedo)) => Arc::new(Lambertian(*albedo)),
             _ => Arc::new(Kurt::white_reference_fabric()),
         };
         let material = Arc::new(Kurt::two_thread_fabric());

@@ -11,7 +11,7 @@ use gonia_formats::rig_toml::read_rig;
 use gonia_formats::{FileError, checksum};
 use gonia_pipeline::process::{Outcome, SampledFrame};
 use gonia_protocol::crc32c;
-use gonia_rig::{FrameRow, Reference, Rig, Role};
+use gonia_rig::{FrameRow, Reflectance, Rig, Role};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -274,8 +274,8 @@ fn check_crc(path: &Path, expected: &str) -> Result<(), FileError> {
 
 /// The file beside `rig.toml` that a rig names.
 pub fn table_of(rig: &Rig) -> Option<&str> {
-    match &rig.reference {
-        Some(Reference::Table { file, .. }) => Some(file),
+    match &rig.reference.as_ref()?.reflectance {
+        Reflectance::Table { file, .. } => Some(file),
         _ => None,
     }
 }

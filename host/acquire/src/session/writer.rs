@@ -507,10 +507,10 @@ pub(super) mod tests {
     fn a_table_that_has_changed_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut rig = Rig::paper(100);
-        rig.reference = Some(gonia_rig::Reference::Table {
+        rig.reference = Some(gonia_rig::Reference::from(gonia_rig::Reflectance::Table {
             file: "tile.csv".into(),
             table: gonia_rig::ReflectanceTable::ByIncidence(Vec::new()),
-        });
+        }));
         let rig = toml::to_string(&rig).unwrap();
         let up = Direction::from_deg(0.0, 0.0);
         let table = b"theta_i,r,g,b\n0,0.9,0.9,0.9\n80,0.9,0.9,0.8\n";

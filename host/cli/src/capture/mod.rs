@@ -25,7 +25,7 @@ use gonia_formats::{FileError, check_writable};
 use gonia_live::{Listening, LivePage};
 use gonia_pipeline::process::MASKS;
 use gonia_plan::Rings;
-use gonia_rig::{Reference, Rig, rig_remarks};
+use gonia_rig::{Reflectance, Rig, rig_remarks};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use terminal::Terminal;
@@ -283,7 +283,8 @@ impl Capture {
         let processed = session
             .samples(&progress.watch())
             .context("the session is complete, but gives no samples yet")?;
-        let note = processed.note(sample_facts::of_session("gonia capture", &session));
+        let facts = sample_facts::of_session("gonia capture", &session);
+        let note = processed.note(session.rig(), facts);
         write_noted_samples(&self.folder.join("samples.npy"), &processed.samples, &note)?;
         if !processed.masks.is_empty() {
             let path = self.folder.join(MASKS);
@@ -319,7 +320,8 @@ fn say_where(live: &LivePage) {
 
 /// The file that a rig names, beside it.
 fn beside(path: &Path, rig: &Rig) -> Result<Option<(String, Vec<u8>)>, FileError> {
-    let Some(Reference::Table { file, .. }) = &rig.reference else {
+    let reflectance = rig.reference.as_ref().map(|of| &of.reflectance);
+    let Some(Reflectance::Table { file, .. }) = reflectance else {
         return Ok(None);
     };
     let table = path.with_file_name(file);

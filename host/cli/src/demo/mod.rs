@@ -108,7 +108,7 @@ impl Demo {
         let mut rows = measured.rig_rows;
         rows.extend(account::describe(&measured.processed));
         if let Some(bands) = run.demo.bands {
-            rows.extend(run.measure_bands(bands, step, &measured.processed)?);
+            rows.extend(run.measure_bands(bands, step, &measured)?);
         }
         let (mut summary, dense, cells) = run.fill(step, &measured.session, measured.processed)?;
         run.write_truth(&dense, &mut summary)?;
@@ -186,7 +186,7 @@ impl Run {
         }
         let masks = Masks::default();
         let processed = samples_of(&rig, &camera, &masks, &self.progress.watch())?;
-        let note = processed.note(self.facts());
+        let note = processed.note(&rig, self.facts());
         self.progress.stage("writing samples", |_| {
             write_noted_samples(&self.path("samples.npy"), &processed.samples, &note)
         })?;
@@ -274,11 +274,12 @@ impl Run {
         &self,
         bands: usize,
         step_deg: f64,
-        processed: &Processed,
+        measured: &Measured,
     ) -> Result<Vec<(String, String)>> {
+        let processed = &measured.processed;
         let wavelengths = bands::wavelengths(bands);
         let samples = bands::samples(&processed.samples, &wavelengths);
-        let note = processed.note(self.facts());
+        let note = processed.note(&measured.rig, self.facts());
         self.progress.stage("writing samples of bands", |_| {
             write_noted_channels(&self.path(BAND_SAMPLES), &samples, &note)
         })?;

@@ -69,7 +69,7 @@ impl DemoRig {
     /// What a lab knows when it calibrates: the drawing, and its tile.
     pub fn with_tile(&self) -> Rig {
         Rig {
-            reference: Some(Reference::Reflectance(TILE)),
+            reference: Some(Reference::lambertian(TILE)),
             ..self.nominal.clone()
         }
     }

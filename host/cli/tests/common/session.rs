@@ -14,7 +14,7 @@ pub fn small_rig() -> Rig {
     let mut rig = Rig::paper(100);
     rig.sampling.grid_mm = 40.0;
     rig.sampling.patch_mm = 28.0;
-    rig.reference = Some(Reference::Reflectance([0.9, 0.8, 0.7]));
+    rig.reference = Some(Reference::lambertian([0.9, 0.8, 0.7]));
     rig.source = Some(Source::Simulated {
         seed: 1,
         exact: true,

@@ -18,7 +18,7 @@ mod light;
 mod light_off;
 mod lines;
 mod mirror;
-mod numbers;
+pub(crate) mod numbers;
 mod orientation;
 mod residuals;
 mod shading;

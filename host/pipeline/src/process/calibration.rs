@@ -15,26 +15,7 @@ use crate::process::reference::{ReferenceFrame, References};
 use crate::process::reflectance::KnownReference;
 use gonia_brdf::{Pose, Vec3};
 use gonia_imaging::{Mask, SamplingGrid};
-use gonia_rig::{FrameRow, Remark, Rig};
-
-/// How light and beam were divided out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferenceCalibration {
-    /// By a reference of known reflectance: f = (I/I_R)·ρ/π, in 1/sr.
-    KnownReference,
-    /// By an unknown reference measured over the whole plan: eq. (3), relative to the irradiance
-    /// at the target's centre at normal incidence.
-    UnknownReference,
-    /// By an ideal point light over the rig's geometry: relative.
-    GeometricModel,
-}
-
-impl ReferenceCalibration {
-    /// Whether values are in 1/sr.
-    pub fn is_absolute(self) -> bool {
-        self == Self::KnownReference
-    }
-}
+use gonia_rig::{FrameRow, ReferenceCalibration, Remark, Rig};
 
 /// Compensates the samples of one session.
 pub struct Calibrator {

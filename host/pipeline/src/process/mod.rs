@@ -18,7 +18,7 @@ pub mod sampled;
 pub mod source;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
-pub use calibration::ReferenceCalibration;
+pub use gonia_rig::ReferenceCalibration;
 pub use masks::{MASKS, Masks};
 pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
 pub use source::{FrameRow, FrameSource, Role};

@@ -2,7 +2,7 @@
 
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{Direction, Pose};
-use gonia_rig::{Reference, ReflectanceTable};
+use gonia_rig::{Reference, Reflectance, ReflectanceTable};
 use std::f64::consts::PI;
 
 /// Steps of the lattice on which a table is tabulated again, degrees: of θi and θv, and of the
@@ -23,9 +23,9 @@ pub enum KnownReference {
 impl KnownReference {
     /// Of a rig's reference.
     pub fn new(reference: &Reference) -> Self {
-        match reference {
-            Reference::Reflectance(rho) => Self::Lambertian(rho.map(|rho| (rho / PI) as f32)),
-            Reference::Table { table, .. } => Self::Tabled(tabulate(table)),
+        match &reference.reflectance {
+            Reflectance::Lambertian(rho) => Self::Lambertian(rho.map(|rho| (rho / PI) as f32)),
+            Reflectance::Table { table, .. } => Self::Tabled(tabulate(table)),
         }
     }
 
@@ -154,10 +154,10 @@ mod tests {
     use gonia_brdf::Elementary;
 
     fn known(table: ReflectanceTable) -> KnownReference {
-        KnownReference::new(&Reference::Table {
+        KnownReference::new(&Reference::from(Reflectance::Table {
             file: "t.csv".into(),
             table,
-        })
+        }))
     }
 
     fn at(reference: &KnownReference, a: [f64; 4]) -> f64 {

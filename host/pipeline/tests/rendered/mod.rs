@@ -140,7 +140,7 @@ pub fn random_rows(role: Role, n: usize, seed: u64) -> Vec<FrameRow> {
 
 pub fn nominal(px: usize) -> Rig {
     let mut rig = Rig::paper(px);
-    rig.reference = Some(Reference::Reflectance([0.9; 3]));
+    rig.reference = Some(Reference::lambertian([0.9; 3]));
     rig.target.mirror_height_mm = Some(2.9);
     rig
 }

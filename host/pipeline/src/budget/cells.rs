@@ -1,0 +1,295 @@
+//! The measurement equation at every cell of a dense BRDF, and at any pair of directions of a fit.
+
+use crate::budget::equation::{Effects, Equation, Part, Shape, Slant};
+use gonia_brdf::{Direction, Elementary, Grid};
+use gonia_rig::Budget;
+
+/// How far apart directions are whose values give slopes, degrees, at least.
+const STEP_DEG: f64 = 2.0;
+/// A frame shows views so far about its own, degrees: the target's half side from the camera's distance.
+const FRAME_DEG: f64 = 8.0;
+/// Views that stand for those of the same frame.
+const AROUND: usize = 8;
+
+/// The uncertainties of a row of cells, in the unit of the values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CellParts {
+    /// Of the directions.
+    pub direction: Vec<f32>,
+    /// Of the value's scale.
+    pub scale: Vec<f32>,
+}
+
+/// The nodes about a node, as its slopes and bends need them.
+struct Node {
+    slant: Slant,
+    /// The nodes after and before it along its meridian and across it.
+    beside: [[u32; 2]; 2],
+    /// One over the angle between those two, per radian …
+    per_span: [f64; 2],
+    /// … and one over the square of half of it; zero at the rim, where one of them is the node itself.
+    per_square: [f64; 2],
+    /// Views that the same frame shows.
+    around: [u32; AROUND],
+}
+
+/// The measurement equation over the cells of a channel's plane.
+pub struct CellUncertainty<'a> {
+    grid: Grid,
+    plane: &'a [f32],
+    equation: Equation,
+    nodes: Vec<Node>,
+}
+
+impl<'a> CellUncertainty<'a> {
+    /// Over a plane of `grid.n_cells()` values; `None` where it is not of this size.
+    pub fn new(grid: Grid, plane: &'a [f32], budget: &Budget) -> Option<Self> {
+        (plane.len() == grid.n_cells()).then(|| Self {
+            grid,
+            plane,
+            equation: Equation::new(budget),
+            nodes: (0..grid.n_directions()).map(|k| node(grid, k)).collect(),
+        })
+    }
+
+    /// The effects at a cell, by the indices of its light and view.
+    pub fn effects(&self, light: usize, view: usize) -> Effects {
+        let (at_light, at_view) = (&self.nodes[light], &self.nodes[view]);
+        let n = self.grid.n_directions();
+        let at = |light: u32, view: u32| f64::from(self.plane[light as usize * n + view as usize]);
+        let (i, v) = (light as u32, view as u32);
+        let value = at(i, v);
+        let mut slopes = [0.0; 4];
+        let mut bends = [0.0; 2];
+        for axis in 0..2 {
+            let [after, before] = at_light.beside[axis].map(|i| at(i, v));
+            slopes[axis] = (after - before) * at_light.per_span[axis];
+            bends[0] += (after + before - 2.0 * value) * at_light.per_square[axis];
+            let [after, before] = at_view.beside[axis].map(|v| at(i, v));
+            slopes[2 + axis] = (after - before) * at_view.per_span[axis];
+            bends[1] += (after + before - 2.0 * value) * at_view.per_square[axis];
+        }
+        let around: f64 = at_view.around.iter().map(|v| at(i, *v)).sum();
+        let shape = Shape {
+            value,
+            slopes,
+            bends,
+            surround: around / AROUND as f64,
+        };
+        self.equation.at(&at_light.slant, &at_view.slant, &shape)
+    }
+
+    /// The uncertainties of all views under a light.
+    pub fn row(&self, light: usize) -> CellParts {
+        let n = self.grid.n_directions();
+        let mut parts = CellParts {
+            direction: Vec::with_capacity(n),
+            scale: Vec::with_capacity(n),
+        };
+        for view in 0..n {
+            let value = f64::from(self.plane[light * n + view]).max(0.0);
+            let effects = self.effects(light, view);
+            parts
+                .direction
+                .push((value * effects.u(Part::Direction)) as f32);
+            parts.scale.push((value * effects.u(Part::Scale)) as f32);
+        }
+        parts
+    }
+}
+
+fn node(grid: Grid, index: usize) -> Node {
+    let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
+    let step = grid.step_deg().to_radians();
+    let (theta, phi) = (index / n_phi, index % n_phi);
+    let sine = (theta as f64 * step).sine();
+    let at = |theta: usize, phi: usize| (theta * n_phi + phi % n_phi) as u32;
+    let opposite = phi + n_phi / 2;
+    // Along the meridian, over the pole where it is near, and ending at the rim.
+    let along = |steps: usize| {
+        let after = at((theta + steps).min(n_theta - 1), phi);
+        let before = match theta.checked_sub(steps) {
+            Some(theta) => at(theta, phi),
+            None => at(steps - theta, opposite),
+        };
+        let past = (theta + steps).saturating_sub(n_theta - 1);
+        ([after, before], past)
+    };
+    // So many nodes across it span about as many degrees as `deg`, or at most a quarter of a turn; at the pole
+    // those of the first ring do.
+    let across = |deg: f64| {
+        let quarter = n_phi / 4;
+        let wide = deg.to_radians() / step;
+        if theta == 0 {
+            let ring = (wide.round() as usize).clamp(1, n_theta - 1);
+            return (
+                [at(ring, phi + quarter), at(ring, phi + n_phi - quarter)],
+                ring as f64 * step,
+            );
+        }
+        let steps = ((wide / sine).ceil() as usize).clamp(1, quarter);
+        let half = (sine * (steps as f64 * step).sine()).max(sine * step);
+        (
+            [at(theta, phi + steps), at(theta, phi + n_phi - steps)],
+            half,
+        )
+    };
+    let (meridian, past) = along(1);
+    let (ring, half) = across(STEP_DEG.max(grid.step_deg()));
+    let wide = ((FRAME_DEG.to_radians() / step).round() as usize)
+        .max(1)
+        .min(n_theta - 1);
+    let (far, _) = along(wide);
+    let (side, _) = across(FRAME_DEG);
+    let corner = |far: u32, side: u32| {
+        let ring = far as usize / n_phi;
+        at(ring, side as usize % n_phi)
+    };
+    let around = [
+        far[0],
+        far[1],
+        side[0],
+        side[1],
+        corner(far[0], side[0]),
+        corner(far[0], side[1]),
+        corner(far[1], side[0]),
+        corner(far[1], side[1]),
+    ];
+    let is_rim = past > 0;
+    Node {
+        slant: Slant::of(grid.direction(index)),
+        beside: [meridian, ring],
+        per_span: [1.0 / (if is_rim { 1.0 } else { 2.0 } * step), 0.5 / half],
+        per_square: [
+            if is_rim { 0.0 } else { 1.0 / (step * step) },
+            1.0 / (half * half),
+        ],
+        around,
+    }
+}
+
+impl Equation {
+    /// The effects at any pair of directions of a BRDF that can be asked there.
+    pub fn of_function(
+        &self,
+        light: Direction,
+        view: Direction,
+        at: &dyn Fn(Direction, Direction) -> f64,
+    ) -> Effects {
+        let value = at(light, view);
+        let half = STEP_DEG.to_radians();
+        let mut slopes = [0.0; 4];
+        let mut bends = [0.0; 2];
+        for (axis, turn) in [[STEP_DEG, 0.0], [0.0, STEP_DEG]].into_iter().enumerate() {
+            let [after, before] = [1.0, -1.0].map(|s| at(moved(light, turn.map(|t| s * t)), view));
+            slopes[axis] = (after - before) / (2.0 * half);
+            bends[0] += (after + before - 2.0 * value) / (half * half);
+            let [after, before] = [1.0, -1.0].map(|s| at(light, moved(view, turn.map(|t| s * t))));
+            slopes[2 + axis] = (after - before) / (2.0 * half);
+            bends[1] += (after + before - 2.0 * value) / (half * half);
+        }
+        let mut around = 0.0;
+        for along in [-FRAME_DEG, 0.0, FRAME_DEG] {
+            for across in [-FRAME_DEG, 0.0, FRAME_DEG] {
+                if along != 0.0 || across != 0.0 {
+                    around += at(light, moved(view, [along, across]));
+                }
+            }
+        }
+        let shape = Shape {
+            value,
+            slopes,
+            bends,
+            surround: around / AROUND as f64,
+        };
+        self.at(&Slant::of(light), &Slant::of(view), &shape)
+    }
+}
+
+/// A direction moved along its meridian (away from the pole) and across it (anticlockwise), degrees; never below
+/// the horizon.
+fn moved(direction: Direction, [along, across]: [f64; 2]) -> Direction {
+    let (sin_t, cos_t) = direction.theta_deg().to_radians().sine_cosine();
+    let (sin_p, cos_p) = direction.phi_deg().to_radians().sine_cosine();
+    let (a, b) = (along.to_radians().tangent(), across.to_radians().tangent());
+    let to = [
+        sin_t * cos_p + a * cos_t * cos_p - b * sin_p,
+        sin_t * sin_p + a * cos_t * sin_p + b * cos_p,
+        (cos_t - a * sin_t).max(1e-3),
+    ];
+    Direction::from_vec3(gonia_brdf::direction::normalize(to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_brdf::DenseBrdf;
+    use gonia_brdf::model::{Brdf, Ggx};
+    use gonia_rig::{Input, ReferenceCalibration, Rig};
+
+    /// Rough enough for a grid of 2 degrees to show its slopes, and not isotropic.
+    const BRDF: Ggx = Ggx {
+        diffuse: [0.2; 3],
+        specular: [0.6; 3],
+        f0: 0.5,
+        alpha_x: 0.5,
+        alpha_y: 0.35,
+        azimuth_deg: 25.0,
+    };
+
+    fn budget() -> Budget {
+        let rig = Rig::paper(100);
+        let known = ReferenceCalibration::KnownReference;
+        let lengths = [1100.0, 1800.0, 14.0];
+        let budget = Budget::new(known, 0.3, lengths, |input| input.of(&rig));
+        budget.with(Input::LightDiameter, 100.0)
+    }
+
+    #[test]
+    fn cells_and_functions_have_the_same_effects() {
+        let grid = Grid::with_step_deg(2.0).unwrap();
+        // Of a grid of this size only the rows about a light are needed: the rest stays zero.
+        let lights = [[40.0, 90.0], [0.0, 120.0], [62.0, 358.0]];
+        for [theta, phi] in lights {
+            let light = grid.n_phi() * (theta / 2.0) as usize + (phi / 2.0) as usize;
+            let equation = Equation::new(&budget());
+            let at = |i: Direction, v: Direction| BRDF.eval(i.to_vec3(), v.to_vec3())[1];
+            let n = grid.n_directions();
+            let mut plane = vec![0.0f32; grid.n_cells()];
+            let near = node(grid, light).beside;
+            for row in near.into_iter().flatten().chain([light as u32]) {
+                let row = row as usize;
+                let d = grid.direction(row);
+                for view in 0..n {
+                    plane[row * n + view] = at(d, grid.direction(view)) as f32;
+                }
+            }
+            let cells = CellUncertainty::new(grid, &plane, &budget()).unwrap();
+            for [tv, pv] in [[30.0, 200.0], [0.0, 44.0], [2.0, 10.0], [66.0, 272.0]] {
+                let view = grid.n_phi() * (tv / 2.0) as usize + (pv / 2.0) as usize;
+                let by_cells = cells.effects(light, view);
+                let (i, v) = (grid.direction(light), grid.direction(view));
+                let by_function = equation.of_function(i, v, &at);
+                for part in [Part::Scale, Part::Direction] {
+                    let (a, b) = (by_cells.u(part), by_function.u(part));
+                    assert!((a - b).abs() < 0.06 * b, "{theta} {tv} {part:?} {a} {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_rim_and_the_pole_have_uncertainties_too() {
+        let grid = Grid::with_step_deg(10.0).unwrap();
+        let brdf = DenseBrdf::tabulate(grid, &BRDF);
+        let plane = &brdf.planes()[0];
+        let cells = CellUncertainty::new(grid, plane, &budget()).unwrap();
+        for light in [0, 5, grid.n_directions() - 1] {
+            let parts = cells.row(light);
+            for u in parts.direction.iter().chain(&parts.scale) {
+                assert!(u.is_finite() && *u > 0.0 && *u < 1.0, "{light} {u}");
+            }
+        }
+        assert!(CellUncertainty::new(grid, &plane[1..], &budget()).is_none());
+    }
+}

@@ -1,0 +1,146 @@
+//! `[reference]` of `rig.toml`: what a reference reflects, and how well that is known.
+
+use gonia_brdf::Pose;
+use serde::{Deserialize, Serialize};
+
+/// A reference of known reflectance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ReferenceKeys", into = "ReferenceKeys")]
+pub struct Reference {
+    /// What it reflects.
+    pub reflectance: Reflectance,
+    /// How well that is known, and since when.
+    pub certificate: Certificate,
+}
+
+impl Reference {
+    /// A Lambertian one of this reflectance factor per channel, without a certificate.
+    pub fn lambertian(reflectance: [f64; 3]) -> Self {
+        Self::from(Reflectance::Lambertian(reflectance))
+    }
+}
+
+impl From<Reflectance> for Reference {
+    fn from(reflectance: Reflectance) -> Self {
+        Self {
+            reflectance,
+            certificate: Certificate::default(),
+        }
+    }
+}
+
+/// What a reference reflects: either `reflectance` or `table` in `rig.toml`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reflectance {
+    /// The same under all directions: reflectance factor per channel, 0 < ρ ≤ 1.1.
+    Lambertian([f64; 3]),
+    /// By direction.
+    Table {
+        /// The table's CSV, relative to the rig's folder.
+        file: String,
+        /// Its rows, once `gonia_formats::rig_toml::read_rig` has read them.
+        table: ReflectanceTable,
+    },
+}
+
+/// What a reference's certificate says beside its reflectance. Uncertainties are standard ones (k = 1).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Certificate {
+    /// Of its reflectance, as a share of it: half of a certificate's U (k = 2).
+    pub u: Option<f64>,
+    /// Of its departure from a Lambertian one, as a share at a polar angle θ of light or view over
+    /// (1 − cos θ)².
+    pub u_angle: Option<f64>,
+    /// Of its tilt against the sample's plane, degrees.
+    pub tilt_u_deg: Option<f64>,
+    /// Of its height over the sample's plane, mm.
+    pub height_u_mm: Option<f64>,
+    /// Its certificate, by name or number.
+    pub certificate: Option<String>,
+    /// The last day on which it may be relied on, as `2027-03-31`.
+    pub valid_until: Option<String>,
+}
+
+/// Reflectance factors (π times the BRDF) by direction; never empty in a rig that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReflectanceTable {
+    /// By θi in degrees, in order.
+    ByIncidence(Vec<(f64, [f64; 3])>),
+    /// By light and view. A reference is taken as isotropic and reciprocal.
+    ByPose(Vec<(Pose, [f64; 3])>),
+}
+
+/// The keys of `[reference]`.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReferenceKeys {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reflectance: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    table: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    u: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    u_angle: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tilt_u_deg: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    height_u_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    certificate: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    valid_until: Option<String>,
+}
+
+impl TryFrom<ReferenceKeys> for Reference {
+    type Error = &'static str;
+
+    fn try_from(keys: ReferenceKeys) -> Result<Self, Self::Error> {
+        let reflectance = match (keys.reflectance, keys.table) {
+            (Some(rho), None) => Reflectance::Lambertian(rho),
+            (None, Some(file)) => Reflectance::Table {
+                file,
+                table: ReflectanceTable::ByIncidence(Vec::new()),
+            },
+            _ => return Err("[reference] needs either reflectance or table"),
+        };
+        Ok(Self {
+            reflectance,
+            certificate: Certificate {
+                u: keys.u,
+                u_angle: keys.u_angle,
+                tilt_u_deg: keys.tilt_u_deg,
+                height_u_mm: keys.height_u_mm,
+                certificate: keys.certificate,
+                valid_until: keys.valid_until,
+            },
+        })
+    }
+}
+
+impl From<Reference> for ReferenceKeys {
+    fn from(reference: Reference) -> Self {
+        let (reflectance, table) = match reference.reflectance {
+            Reflectance::Lambertian(rho) => (Some(rho), None),
+            Reflectance::Table { file, .. } => (None, Some(file)),
+        };
+        let Certificate {
+            u,
+            u_angle,
+            tilt_u_deg,
+            height_u_mm,
+            certificate,
+            valid_until,
+        } = reference.certificate;
+        Self {
+            reflectance,
+            table,
+            u,
+            u_angle,
+            tilt_u_deg,
+            height_u_mm,
+            certificate,
+            valid_until,
+        }
+    }
+}
