@@ -7,12 +7,17 @@ use crate::symmetry::SymmetryArgument;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
-use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense_channels, write_error_bars};
+use gonia_formats::dense::{
+    ChannelErrors, CombineErrors, ERRORS_OF, check_dense_name, write_dense_channels,
+    write_error_bars,
+};
 use gonia_formats::samples::read_channels_of_all;
 use gonia_formats::{check_output, checksum, is_same_file};
+use gonia_pipeline::budget::{StratumBudget, summary};
+use gonia_pipeline::budget::{UNCERTAINTIES, budget_in, combine_errors};
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{DirectionalAlbedo, FillAccount, FillMethod, FillOptions, fill, fill_to_file};
-use gonia_rig::{Channels, SampleValues, Scale};
+use gonia_rig::{Budget, Channels, DenseChannels, SampleValues, Scale};
 use std::path::{Path, PathBuf};
 
 /// Interpolates samples to every cell of the grid.
@@ -128,8 +133,9 @@ impl Fill {
         facts.insert("samples".to_owned(), names.clone());
         let channels = read.values.channels().clone();
         let filled = self.fill(read.values, scale, &options, facts, &progress);
-        let account = filled.with_context(|| names)?;
+        let (account, uncertainty) = filled.with_context(|| names)?;
         let mut rows = self.describe(&account, &channels, scale);
+        rows.extend(uncertainty);
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));
         if channels != Channels::Rgb {
             rows.insert(4, ("channels".into(), channels.to_string()));
@@ -151,15 +157,16 @@ impl Fill {
         options: &FillOptions,
         facts: Provenance,
         progress: &Progress,
-    ) -> Result<FillAccount> {
+    ) -> Result<(FillAccount, Vec<(String, String)>)> {
         let watch = progress.watch();
         if !options.fits_memory(samples.channels())? {
             let account = fill_to_file(samples, scale, options, &self.output, &facts, &watch)?;
             remarks::print(&account.remarks);
-            return Ok(account);
+            return Ok((account, Vec::new()));
         }
         let filled = fill(samples, scale, options, &watch)?;
         remarks::print(&filled.account.remarks);
+        let budget = budget_in(&facts)?;
         let mut file = filled.dense;
         let mut error_facts = file.provenance.clone();
         if self.error.is_some() {
@@ -170,12 +177,21 @@ impl Fill {
         progress.stage("writing the dense BRDF", |_| {
             write_dense_channels(&self.output, &file)
         })?;
+        let mut uncertainty = Vec::new();
         if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
+            uncertainty = uncertainty_rows(&file, &bars, budget.as_ref());
+            let combine = budget.as_ref().and_then(|budget| {
+                error_facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
+                combine_errors(&file, budget)
+            });
+            let combine = combine
+                .as_ref()
+                .map(|combine| combine as &CombineErrors<'_>);
             progress.stage("writing the error bars", |_| {
-                write_error_bars(path, file.grid, bars, scale, &error_facts)
+                write_error_bars(path, file.grid, bars, combine, scale, &error_facts)
             })?;
         }
-        Ok(filled.account)
+        Ok((filled.account, uncertainty))
     }
 
     /// What became of the samples and of the cells, as rows.
@@ -210,6 +226,34 @@ impl Fill {
         let name = |path: &PathBuf| Path::display(path).to_string();
         self.samples.iter().map(name).collect::<Vec<_>>().join(" ")
     }
+}
+
+/// What the standard errors hold, and their size: the largest contributions of each part of the domain.
+fn uncertainty_rows(
+    dense: &DenseChannels,
+    errors: &ChannelErrors,
+    budget: Option<&Budget>,
+) -> Vec<(String, String)> {
+    let Some(budget) = budget else {
+        let alone = "noise and interpolation alone: the samples say nothing of their rig";
+        return vec![("error bars hold".to_owned(), alone.to_owned())];
+    };
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let row = |of: &StratumBudget| {
+        let largest = of.sorted().into_iter().take(3);
+        let largest: Vec<String> = largest
+            .map(|(name, u)| format!("{name} {}", percent(u)))
+            .collect();
+        (
+            format!("u (k = 1), {}", of.stratum),
+            format!(
+                "{}: {}, ... (medians)",
+                percent(of.combined),
+                largest.join(", ")
+            ),
+        )
+    };
+    summary(dense, errors, budget).iter().map(row).collect()
 }
 
 /// Where the cells' values come from.

@@ -3,12 +3,13 @@
 use crate::say::errln;
 use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
 use gonia_formats::samples::read_channels;
 use gonia_pipeline::FitOfSamples;
+use gonia_pipeline::budget::budget_in;
 use gonia_rig::{Channels, Remark};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,13 @@ pub struct Query {
     /// Of samples: the material's symmetry about its normal
     #[arg(long, value_enum, default_value = "auto")]
     symmetry: SymmetryArgument,
+    /// Add the standard uncertainty of each value (u, k = 1) and the expanded one (U, k = 2): of samples by the fit
+    /// and what they say of their rig, of a dense BRDF from the file that --error names
+    #[arg(long)]
+    uncertainty: bool,
+    /// Of a dense BRDF: its error bars, as gonia fill --error wrote them; asks for uncertainties too
+    #[arg(long, value_name = "ERR.exr")]
+    error: Option<PathBuf>,
 }
 
 /// Endings of samples; what else there is, is a dense BRDF.
@@ -47,24 +55,52 @@ impl Query {
         let mut brdf = DenseLookup::open(&self.dense)?;
         let rows = asked()?;
         let mut beyond = Beyond::of(brdf.grid());
+        let mut errors = self.errors_of(&brdf)?;
         let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = header(&mut out, brdf.channels());
+        let mut said = header(&mut out, brdf.channels(), errors.is_some());
         for asked in rows {
             if said.is_err() {
                 break;
             }
             beyond.count(asked);
             let (light, view) = pair_of(asked.angles_deg);
-            said = row(&mut out, asked.angles_deg, &brdf.lookup(light, view)?);
+            let mut values = brdf.lookup(light, view)?;
+            if let Some(errors) = &mut errors {
+                with_u(&mut values, errors.lookup(light, view)?);
+            }
+            said = row(&mut out, asked.angles_deg, &values);
         }
         say::written(said.and_then(|()| out.flush()))?;
         remarks::print(beyond.remark().as_slice());
         Ok(())
     }
 
+    /// The error bars of a dense BRDF, where they are asked for.
+    fn errors_of(&self, brdf: &DenseLookup) -> Result<Option<DenseLookup>> {
+        let Some(path) = &self.error else {
+            if self.uncertainty {
+                bail!(
+                    "--uncertainty: {} holds no uncertainties; give the file that gonia fill --error wrote with it by --error ERR.exr",
+                    self.dense.display()
+                );
+            }
+            return Ok(None);
+        };
+        let errors = DenseLookup::open(path)?;
+        if errors.grid() != brdf.grid() || errors.channels() != brdf.channels() {
+            bail!(
+                "--error {}: has another grid or other channels than {}; give the error bars that were written with it",
+                path.display(),
+                self.dense.display()
+            );
+        }
+        Ok(Some(errors))
+    }
+
     fn ask_samples(self) -> Result<()> {
         let read = read_channels(&self.dense)?;
         remarks::print(&read.remarks);
+        let provenance = read.provenance;
         let (fit, said_of_it) = FitOfSamples::new(read.values, self.symmetry.into())
             .with_context(|| self.dense.display().to_string())?;
         remarks::print(&said_of_it);
@@ -72,13 +108,37 @@ impl Query {
         errln!("{} ({})", choice.settings, choice.reason);
         let rows = asked()?;
         let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
+        let found = if self.uncertainty {
+            let budget = budget_in(&provenance)?;
+            if budget.is_none() {
+                errln!(
+                    "u holds noise and interpolation alone: the samples say nothing of their rig"
+                );
+            }
+            let found = fit.with_uncertainty(&pairs, budget.as_ref()).into_iter();
+            let split = found.map(|channels| {
+                let mut values: Vec<f32> = channels.iter().map(|of| of[0]).collect();
+                with_u(&mut values, channels.iter().map(|of| of[1]).collect());
+                values
+            });
+            split.collect()
+        } else {
+            fit.at_all(&pairs)
+        };
         let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = header(&mut out, fit.channels());
-        for (asked, values) in rows.into_iter().zip(fit.at_all(&pairs)) {
+        let mut said = header(&mut out, fit.channels(), self.uncertainty);
+        for (asked, values) in rows.into_iter().zip(found) {
             said = said.and_then(|()| row(&mut out, asked.angles_deg, &values));
         }
         say::written(said.and_then(|()| out.flush()))
     }
+}
+
+/// Adds uncertainties to values: u of each, and U = 2 u of each.
+fn with_u(values: &mut Vec<f32>, u: Vec<f32>) {
+    let expanded: Vec<f32> = u.iter().map(|u| 2.0 * u).collect();
+    values.extend(u);
+    values.extend(expanded);
 }
 
 /// The directions on standard input.
@@ -99,8 +159,18 @@ fn pair_of([theta_i, phi_i, theta_v, phi_v]: [f64; 4]) -> (Direction, Direction)
     )
 }
 
-fn header(out: &mut impl Write, channels: &Channels) -> std::io::Result<()> {
-    let names = channels.column_names().join(",");
+fn header(
+    out: &mut impl Write,
+    channels: &Channels,
+    with_uncertainty: bool,
+) -> std::io::Result<()> {
+    let mut names = channels.column_names();
+    if with_uncertainty {
+        let of = |u: &'static str| names.iter().map(move |name| format!("{u}_{name}"));
+        let more: Vec<String> = of("u").chain(of("U")).collect();
+        names.extend(more);
+    }
+    let names = names.join(",");
     writeln!(out, "{},{names}", ANGLES.join(","))
 }
 

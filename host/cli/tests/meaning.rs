@@ -8,8 +8,10 @@ mod common;
 use cases::{Case, document};
 use common::{gonia, text};
 use gonia_brdf::Elementary;
+use gonia_rig::{Budget, Input, KnownFrom, ReferenceCalibration};
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 /// θi, φi, θv, φv in degrees, and a value.
 type Row = [f64; 5];
@@ -314,4 +316,90 @@ fn samples_are_asked_without_a_grid_and_keep_a_peak_that_a_grid_would_lose() {
     for got in values {
         assert!((got / value(30.33) - 1.0).abs() < 0.05, "{printed}");
     }
+}
+
+#[test]
+fn values_have_uncertainties_that_hold_what_the_samples_say_of_their_rig() {
+    let dir = tempfile::tempdir().unwrap();
+    let known = ReferenceCalibration::KnownReference;
+    let small = |input: Input| (input.default_value() * 1e-3, KnownFrom::Stated);
+    let budget = Budget::new(known, 0.3, [1100.0, 1800.0, 1.0], small);
+    let write = |name: &str, note: &str| {
+        let mut csv = format!("# scale = absolute\n{note}theta_i,phi_i,theta_v,phi_v,brdf\n");
+        for [ti, pi, tv, pv, value] in good() {
+            writeln!(csv, "{ti},{pi},{tv},{pv},{value}").unwrap();
+        }
+        let path = dir.path().join(name);
+        fs::write(&path, csv).unwrap();
+        path
+    };
+    // An error of the reference of 5 % is the same everywhere; one of the light's direction shows in the highlight.
+    let noted = |budget: &Budget| format!("# uncertainties = {budget}\n");
+    let scale = write(
+        "scale.csv",
+        &noted(&budget.clone().with(Input::Reference, 0.05)),
+    );
+    let direction = budget.clone().with(Input::LightDirection, 1.0);
+    let direction = write("direction.csv", &noted(&direction));
+    let alone = write("alone.csv", "");
+    let asked = "theta_i,phi_i,theta_v,phi_v\n30,45,38,225\n40,10,20,90\n";
+    let query = |arguments: &[&str]| {
+        let output = gonia(arguments, asked);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        let (header, rows) = printed.split_once('\n').unwrap();
+        assert!(header.ends_with(",Y,u_Y,U_Y"), "{header}");
+        let rows = rows.lines().map(|line| {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            assert!(
+                (cells[6] - 2.0 * cells[5]).abs() < 1e-6 * cells[6],
+                "{line}"
+            );
+            [cells[4], cells[5]]
+        });
+        (rows.collect::<Vec<[f64; 2]>>(), said)
+    };
+    let of = |path: &Path| query(&["query", text(path), "--uncertainty"]);
+    let (noise, said) = of(&alone);
+    assert!(said.contains("noise and interpolation alone"), "{said}");
+    let (scaled, _) = of(&scale);
+    let (directed, _) = of(&direction);
+    for k in 0..2 {
+        let share = |u: f64| (u * u - noise[k][1] * noise[k][1]).max(0.0).sqrt() / noise[k][0];
+        assert!(
+            (share(scaled[k][1]) - 0.05).abs() < 2e-3,
+            "{k} {scaled:?} {noise:?}"
+        );
+    }
+    let added = [0, 1].map(|k| directed[k][1] - noise[k][1]);
+    assert!(added[0] > 3.0 * added[1], "{directed:?} {noise:?}");
+
+    let (dense, error) = (dir.path().join("d.exr"), dir.path().join("e.exr"));
+    let fill = [
+        "fill",
+        text(&scale),
+        "--step",
+        "10",
+        "-o",
+        text(&dense),
+        "--error",
+        text(&error),
+    ];
+    let output = gonia(&fill, "");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert!(printed.contains("u (k = 1), interior"), "{printed}");
+    assert!(printed.contains("reference 5.00 %"), "{printed}");
+    let (by_grid, _) = query(&["query", text(&dense), "--error", text(&error)]);
+    for [value, u] in by_grid {
+        assert!(u > 0.05 * value && u < 0.2 * value, "{value} {u}");
+    }
+    let output = gonia(&["query", text(&dense), "--uncertainty"], asked);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("--error ERR.exr") && said.lines().count() == 1,
+        "{said}"
+    );
 }

@@ -3,7 +3,9 @@
 //! A file is recognised by its first bytes, else by its ending; a name to write to by its ending.
 
 use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
-pub use crate::format::{ChannelErrors, MakeRows, RowsNote, TakeRow};
+pub use crate::format::{
+    ChannelErrors, CombineErrors, ERROR_PARTS, ErrorRow, MakeRows, RowsNote, TakeRow,
+};
 use crate::{FileError, table};
 use gonia_brdf::{Direction, Grid};
 use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
@@ -74,7 +76,8 @@ pub fn write_dense_by_rows(
 }
 
 /// Writes the standard errors of a dense BRDF whole, in the unit of its values, with each cell's
-/// origin (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated).
+/// origin (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated). Where `combine` is given, they are combined
+/// with what it knows, and the parts are written too, as shares.
 ///
 /// # Errors
 /// As [`write_dense`].
@@ -82,10 +85,11 @@ pub fn write_error_bars(
     path: &Path,
     grid: Grid,
     bars: ChannelErrors,
+    combine: Option<&CombineErrors<'_>>,
     scale: Scale,
     provenance: &BTreeMap<String, String>,
 ) -> Result<(), FileError> {
-    (writer_of_name(path)?.error_bars)(path, grid, bars, scale, provenance)
+    (writer_of_name(path)?.error_bars)(path, grid, bars, combine, scale, provenance)
 }
 
 /// Endings that people take for another kind of file than the one that would be written.

@@ -123,6 +123,8 @@ pub(super) struct RowReader {
     first: i32,
     /// What its channels are, and where each stands in a row.
     named: Named,
+    /// How many channels a row has: those, and others beside them.
+    channels: usize,
     attributes: BTreeMap<String, String>,
 }
 
@@ -146,9 +148,7 @@ impl RowReader {
         };
         let channels = &header.channels.list;
         let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
-        let named = named(&names)
-            .ok()
-            .filter(|named| named.places.len() == names.len())?;
+        let named = named(&names).ok()?;
         let is_single = channels
             .iter()
             .all(|c| c.sample_type == SampleType::F32 && c.sampling == Vec2(1, 1));
@@ -183,6 +183,7 @@ impl RowReader {
             offsets,
             first,
             named,
+            channels: names.len(),
             attributes,
         })
     }
@@ -214,6 +215,7 @@ impl RowReader {
     /// All of it, a plane a channel, by all threads; `None` when a row is not where the file says.
     pub fn read_all(&self) -> io::Result<Option<Vec<Vec<f32>>>> {
         let (side, n) = (self.side(), self.named.places.len());
+        let size = 4 * self.channels * side;
         let mut planes: Vec<Vec<f32>> = (0..n).map(|_| vec![0.0; side * side]).collect();
         // Of each row the places of its values, in the order of the channels.
         let mut rows: Vec<Vec<&mut [f32]>> = (0..side).map(|_| Vec::with_capacity(n)).collect();
@@ -222,7 +224,6 @@ impl RowReader {
                 row.push(values);
             }
         }
-        let size = 4 * n * side;
         let in_place = rows.into_par_iter().enumerate().map_init(
             || vec![0; ROW_HEAD as usize + size],
             |bytes, (row, out)| {

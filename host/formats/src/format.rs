@@ -86,9 +86,31 @@ pub struct ChannelErrors {
     pub origin: Vec<u8>,
 }
 
+/// The standard errors of a row of light, with what they consist of.
+pub struct ErrorRow {
+    /// Combined, a list of views a channel, in the unit of the values.
+    pub combined: Vec<Vec<f32>>,
+    /// Of each part ([`ERROR_PARTS`]) as a share of the value, mean over the channels.
+    pub parts: [Vec<f32>; ERROR_PARTS.len()],
+}
+
+/// What standard errors consist of: noise and interpolation, directions, the values' scale. Names of the channels that
+/// hold them.
+pub const ERROR_PARTS: [&str; 3] = ["noise", "direction", "scale"];
+
+/// Combines the standard errors of a row of light from those of noise and interpolation alone: the number of the
+/// light, and of each channel the views.
+pub type CombineErrors<'a> = dyn Fn(usize, &[&[f32]]) -> ErrorRow + Sync + 'a;
+
 /// See [`crate::dense::write_error_bars`].
-pub(crate) type WriteErrorBars =
-    fn(&Path, Grid, ChannelErrors, Scale, &BTreeMap<String, String>) -> Result<(), FileError>;
+pub(crate) type WriteErrorBars = fn(
+    &Path,
+    Grid,
+    ChannelErrors,
+    Option<&CombineErrors<'_>>,
+    Scale,
+    &BTreeMap<String, String>,
+) -> Result<(), FileError>;
 
 /// A file open for reading single cells.
 pub(crate) trait CellReader: Send {

@@ -76,9 +76,11 @@ pub(super) fn write_comments(out: &mut impl Write, note: &SampleNote) -> io::Res
 /// # Errors
 /// Comments, or comments and a note, that contradict each other; an unreadable file.
 pub(super) fn add_to(read: &mut ChannelsRead, samples: &Path) -> Result<(), FileError> {
-    if let Some(scale) = scale_in_comments(samples, &mut read.remarks)? {
+    let said = comments(samples)?;
+    if let Some(scale) = scale_in_comments(samples, &said, &mut read.remarks)? {
         agree(&mut read.scale, scale, samples)?;
     }
+    read.provenance.extend(facts_in(&said));
     let path = path_beside(samples);
     if !path.is_file() {
         return Ok(());
@@ -108,7 +110,7 @@ pub(super) fn add_to(read: &mut ChannelsRead, samples: &Path) -> Result<(), File
         ));
         return Ok(());
     }
-    read.provenance = note.provenance;
+    read.provenance.extend(note.provenance);
     match note.scale {
         Some(scale) => agree(&mut read.scale, scale, samples),
         None => Ok(()),
@@ -126,10 +128,27 @@ fn agree(known: &mut Option<Scale>, said: Scale, samples: &Path) -> Result<(), F
     }
 }
 
+/// The facts in the comments above the header of a text file, as [`write_comments`] writes them.
+fn facts_in(comments: &[String]) -> BTreeMap<String, String> {
+    let is_name = |name: &str| {
+        let is_plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"_.".contains(&b);
+        !name.is_empty() && name.bytes().all(is_plain) && name != SCALE
+    };
+    let parts = comments.iter().filter_map(|line| line.split_once(" = "));
+    let named = parts.filter(|(name, _)| is_name(name));
+    named
+        .map(|(name, fact)| (name.to_owned(), fact.trim().to_owned()))
+        .collect()
+}
+
 /// The scale in the comments above the header of a text file; none of any other file.
-fn scale_in_comments(path: &Path, remarks: &mut Vec<Remark>) -> Result<Option<Scale>, FileError> {
+fn scale_in_comments(
+    path: &Path,
+    comments: &[String],
+    remarks: &mut Vec<Remark>,
+) -> Result<Option<Scale>, FileError> {
     let mut scale = None;
-    for (k, line) in comments(path)?.iter().enumerate() {
+    for (k, line) in comments.iter().enumerate() {
         let Some((name, said)) = line.split_once(['=', ':']) else {
             continue;
         };
@@ -206,6 +225,7 @@ mod tests {
             let read = read_samples(&noted).unwrap();
             assert_eq!(read.scale, Some(Scale::Absolute), "{name}");
             assert_eq!((read.samples, read.remarks), (samples.clone(), vec![]));
+            assert_eq!(read.provenance, absolute().provenance, "{name}");
             assert_eq!(read_samples(&plain).unwrap().scale, None);
             if name.ends_with("npy") {
                 assert_eq!(

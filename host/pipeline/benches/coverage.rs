@@ -15,9 +15,7 @@ use gonia_pipeline::budget::{CellUncertainty, Effect, budget_of};
 use gonia_pipeline::process::{FrameSource, Masks, process};
 use gonia_pipeline::{FillOptions, fill, silent};
 use gonia_rig::Stratum;
-use gonia_rig::{
-    Certificate, Frame, FrameRow, Input, Reference, Rig, Role, SampleSet, Scale, Uncertainties,
-};
+use gonia_rig::{Certificate, Frame, FrameRow, Input, Reference, Rig, Role, Scale, Uncertainties};
 use gonia_sim::scene::{Noise, Scene, SceneGeometry};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -315,18 +313,15 @@ fn run(
             budget = budget.with(input, 0.0);
         }
     }
-    let samples = SampleSet {
-        scale: Scale::Absolute,
-        samples: done.samples,
-    };
     let options = FillOptions {
         with_errors: true,
         ..FillOptions::with_step_deg(STEP_DEG)
     };
-    let filled = fill(samples, &options, &silent).expect("samples are enough");
+    let filled =
+        fill(done.samples, Scale::Absolute, &options, &silent).expect("samples are enough");
     let errors = filled.errors.expect("asked for");
-    let grid = filled.dense.brdf.grid();
-    let plane = &filled.dense.brdf.planes()[1];
+    let grid = filled.dense.grid;
+    let plane = &filled.dense.planes[1];
     let highlight = brightest(grid, material.as_ref());
     without
         .iter()

@@ -7,7 +7,7 @@ use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Direction, Pose, Sample};
 use gonia_formats::FileError;
 use gonia_pipeline::process::*;
-use gonia_rig::{Frame, FrameRow, Reference, Rig, Role};
+use gonia_rig::{Frame, FrameRow, Reference, Reflectance, Rig, Role};
 use gonia_sim::scene::{Beam, Scene, SceneGeometry};
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -104,7 +104,7 @@ impl Demo {
         };
         let measured = run.measure()?;
         remarks::print(&measured.processed.remarks);
-        let mut rows = measured.rig_rows;
+        let mut rows = measured.rig_rows.clone();
         rows.extend(account::describe(&measured.processed));
         if let Some(bands) = run.demo.bands {
             rows.extend(run.measure_bands(bands, step, &measured)?);

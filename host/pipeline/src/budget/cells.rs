@@ -1,8 +1,9 @@
-//! The measurement equation at every cell of a dense BRDF, and at any pair of directions of a fit.
+//! The measurement equation at every cell of a dense BRDF, and at any pair of directions of what can be asked.
 
 use crate::budget::equation::{Effects, Equation, Part, Shape, Slant};
 use gonia_brdf::{Direction, Elementary, Grid};
-use gonia_rig::Budget;
+use gonia_formats::dense::ErrorRow;
+use gonia_rig::{Budget, DenseChannels};
 
 /// How far apart directions are whose values give slopes, degrees, at least.
 const STEP_DEG: f64 = 2.0;
@@ -10,15 +11,6 @@ const STEP_DEG: f64 = 2.0;
 const FRAME_DEG: f64 = 8.0;
 /// Views that stand for those of the same frame.
 const AROUND: usize = 8;
-
-/// The uncertainties of a row of cells, in the unit of the values.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CellParts {
-    /// Of the directions.
-    pub direction: Vec<f32>,
-    /// Of the value's scale.
-    pub scale: Vec<f32>,
-}
 
 /// The nodes about a node, as its slopes and bends need them.
 struct Node {
@@ -78,24 +70,49 @@ impl<'a> CellUncertainty<'a> {
         };
         self.equation.at(&at_light.slant, &at_view.slant, &shape)
     }
+}
 
-    /// The uncertainties of all views under a light.
-    pub fn row(&self, light: usize) -> CellParts {
-        let n = self.grid.n_directions();
-        let mut parts = CellParts {
-            direction: Vec::with_capacity(n),
-            scale: Vec::with_capacity(n),
+/// Combines the standard errors of a dense BRDF's noise and interpolation with its budget, a row of light at a time.
+/// `None` where a plane is not of the grid's size.
+pub fn combine_errors<'a>(
+    dense: &'a DenseChannels,
+    budget: &Budget,
+) -> Option<impl Fn(usize, &[&[f32]]) -> ErrorRow + Sync + use<'a>> {
+    let side = dense.grid.n_directions();
+    let of_channel = |plane: &'a Vec<f32>| CellUncertainty::new(dense.grid, plane, budget);
+    let channels: Vec<CellUncertainty<'a>> =
+        dense.planes.iter().map(of_channel).collect::<Option<_>>()?;
+    let share = 1.0 / channels.len().max(1) as f64;
+    Some(move |light: usize, noise: &[&[f32]]| {
+        let mut row = ErrorRow {
+            combined: Vec::with_capacity(channels.len()),
+            parts: [(); 3].map(|()| vec![0.0; side]),
         };
-        for view in 0..n {
-            let value = f64::from(self.plane[light * n + view]).max(0.0);
-            let effects = self.effects(light, view);
-            parts
-                .direction
-                .push((value * effects.u(Part::Direction)) as f32);
-            parts.scale.push((value * effects.u(Part::Scale)) as f32);
+        for (cells, noise) in channels.iter().zip(noise) {
+            let values = &cells.plane[light * side..(light + 1) * side];
+            let combined = values
+                .iter()
+                .zip(*noise)
+                .enumerate()
+                .map(|(view, (value, noise))| {
+                    let (value, noise) = (f64::from(*value), f64::from(*noise));
+                    let effects = cells.effects(light, view);
+                    let shares = [
+                        if value > 0.0 { noise / value } else { 0.0 },
+                        effects.u(Part::Direction),
+                        effects.u(Part::Scale),
+                    ];
+                    for (part, of) in row.parts.iter_mut().zip(shares) {
+                        part[view] += (share * of) as f32;
+                    }
+                    let known = shares[1] * shares[1] + shares[2] * shares[2];
+                    (noise * noise + value * value * known).sqrt() as f32
+                });
+            let combined = combined.collect();
+            row.combined.push(combined);
         }
-        parts
-    }
+        row
+    })
 }
 
 fn node(grid: Grid, index: usize) -> Node {
@@ -168,42 +185,54 @@ fn node(grid: Grid, index: usize) -> Node {
     }
 }
 
-impl Equation {
-    /// The effects at any pair of directions of a BRDF that can be asked there.
-    pub fn of_function(
-        &self,
-        light: Direction,
-        view: Direction,
-        at: &dyn Fn(Direction, Direction) -> f64,
-    ) -> Effects {
-        let value = at(light, view);
-        let half = STEP_DEG.to_radians();
-        let mut slopes = [0.0; 4];
-        let mut bends = [0.0; 2];
-        for (axis, turn) in [[STEP_DEG, 0.0], [0.0, STEP_DEG]].into_iter().enumerate() {
-            let [after, before] = [1.0, -1.0].map(|s| at(moved(light, turn.map(|t| s * t)), view));
-            slopes[axis] = (after - before) / (2.0 * half);
-            bends[0] += (after + before - 2.0 * value) / (half * half);
-            let [after, before] = [1.0, -1.0].map(|s| at(light, moved(view, turn.map(|t| s * t))));
-            slopes[2 + axis] = (after - before) / (2.0 * half);
-            bends[1] += (after + before - 2.0 * value) / (half * half);
+/// Pairs of directions whose values tell of the surroundings of one: it comes first.
+pub(crate) const PLACES: usize = 9 + AROUND;
+
+/// Those pairs.
+pub(crate) fn places(light: Direction, view: Direction) -> [(Direction, Direction); PLACES] {
+    let mut all = [(light, view); PLACES];
+    let mut next = 1;
+    let mut put = |pair| {
+        if let Some(place) = all.get_mut(next) {
+            *place = pair;
         }
-        let mut around = 0.0;
-        for along in [-FRAME_DEG, 0.0, FRAME_DEG] {
-            for across in [-FRAME_DEG, 0.0, FRAME_DEG] {
-                if along != 0.0 || across != 0.0 {
-                    around += at(light, moved(view, [along, across]));
-                }
+        next += 1;
+    };
+    for turn in [[STEP_DEG, 0.0], [0.0, STEP_DEG]] {
+        for sign in [1.0, -1.0] {
+            put((moved(light, turn.map(|t| sign * t)), view));
+        }
+        for sign in [1.0, -1.0] {
+            put((light, moved(view, turn.map(|t| sign * t))));
+        }
+    }
+    for along in [-FRAME_DEG, 0.0, FRAME_DEG] {
+        for across in [-FRAME_DEG, 0.0, FRAME_DEG] {
+            if along != 0.0 || across != 0.0 {
+                put((light, moved(view, [along, across])));
             }
         }
-        let shape = Shape {
-            value,
-            slopes,
-            bends,
-            surround: around / AROUND as f64,
-        };
-        self.at(&Slant::of(light), &Slant::of(view), &shape)
     }
+    all
+}
+
+/// The shape that the values at such places have.
+pub(crate) fn shape(values: &[f64; PLACES]) -> Shape {
+    let half = STEP_DEG.to_radians();
+    let value = values[0];
+    let mut shape = Shape {
+        value,
+        surround: values[9..].iter().sum::<f64>() / AROUND as f64,
+        ..Shape::default()
+    };
+    for axis in 0..2 {
+        for (whose, from) in [(0, 1 + 4 * axis), (1, 3 + 4 * axis)] {
+            let (after, before) = (values[from], values[from + 1]);
+            shape.slopes[2 * whose + axis] = (after - before) / (2.0 * half);
+            shape.bends[whose] += (after + before - 2.0 * value) / (half * half);
+        }
+    }
+    shape
 }
 
 /// A direction moved along its meridian (away from the pole) and across it (anticlockwise), degrees; never below
@@ -253,7 +282,7 @@ mod tests {
         for [theta, phi] in lights {
             let light = grid.n_phi() * (theta / 2.0) as usize + (phi / 2.0) as usize;
             let equation = Equation::new(&budget());
-            let at = |i: Direction, v: Direction| BRDF.eval(i.to_vec3(), v.to_vec3())[1];
+            let at = |(i, v): (Direction, Direction)| BRDF.eval(i.to_vec3(), v.to_vec3())[1];
             let n = grid.n_directions();
             let mut plane = vec![0.0f32; grid.n_cells()];
             let near = node(grid, light).beside;
@@ -261,7 +290,7 @@ mod tests {
                 let row = row as usize;
                 let d = grid.direction(row);
                 for view in 0..n {
-                    plane[row * n + view] = at(d, grid.direction(view)) as f32;
+                    plane[row * n + view] = at((d, grid.direction(view))) as f32;
                 }
             }
             let cells = CellUncertainty::new(grid, &plane, &budget()).unwrap();
@@ -269,7 +298,8 @@ mod tests {
                 let view = grid.n_phi() * (tv / 2.0) as usize + (pv / 2.0) as usize;
                 let by_cells = cells.effects(light, view);
                 let (i, v) = (grid.direction(light), grid.direction(view));
-                let by_function = equation.of_function(i, v, &at);
+                let shape = shape(&places(i, v).map(at));
+                let by_function = equation.at(&Slant::of(i), &Slant::of(v), &shape);
                 for part in [Part::Scale, Part::Direction] {
                     let (a, b) = (by_cells.u(part), by_function.u(part));
                     assert!((a - b).abs() < 0.06 * b, "{theta} {tv} {part:?} {a} {b}");
@@ -285,9 +315,11 @@ mod tests {
         let plane = &brdf.planes()[0];
         let cells = CellUncertainty::new(grid, plane, &budget()).unwrap();
         for light in [0, 5, grid.n_directions() - 1] {
-            let parts = cells.row(light);
-            for u in parts.direction.iter().chain(&parts.scale) {
-                assert!(u.is_finite() && *u > 0.0 && *u < 1.0, "{light} {u}");
+            for view in 0..grid.n_directions() {
+                let effects = cells.effects(light, view);
+                for u in [Part::Direction, Part::Scale].map(|part| effects.u(part)) {
+                    assert!(u.is_finite() && u > 0.0 && u < 1.0, "{light} {view} {u}");
+                }
             }
         }
         assert!(CellUncertainty::new(grid, &plane[1..], &budget()).is_none());

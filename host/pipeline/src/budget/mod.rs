@@ -26,9 +26,14 @@
 mod cells;
 mod directions;
 mod equation;
+mod record;
+mod summary;
 
-pub use cells::{CellParts, CellUncertainty};
-pub use equation::{Effect, Effects, Equation, Part, Shape};
+pub use cells::{CellUncertainty, combine_errors};
+pub(crate) use cells::{PLACES, places, shape};
+pub use equation::{Effect, Effects, Equation, Part, Shape, Slant};
+pub use record::budget_in;
+pub use summary::{StratumBudget, summary};
 
 use directions::direction_u;
 use gonia_brdf::{Pose, Sample};

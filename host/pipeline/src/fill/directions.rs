@@ -2,11 +2,12 @@
 
 use super::groups::{groups, spread_over};
 use crate::Error;
+use crate::budget::{Equation, PLACES, Part, Slant, places, shape};
 use crate::doubts;
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
-use gonia_brdf::{Direction, SymmetryKind};
-use gonia_rig::{Channels, Remark, SampleValues};
+use gonia_brdf::{Direction, Elementary, SymmetryKind};
+use gonia_rig::{Budget, Channels, Remark, SampleValues};
 
 /// More samples than this are not asked without a grid.
 const SAMPLES_AT_MOST: usize = 1_000_000;
@@ -77,6 +78,37 @@ impl FitOfSamples {
     /// The settings, and why these.
     pub fn choice(&self) -> &Choice {
         &self.choice
+    }
+
+    /// The value of each channel at many pairs of light and view with its standard uncertainty (k = 1), in the same
+    /// unit: of noise and interpolation, and of what a budget knows.
+    pub fn with_uncertainty(
+        &self,
+        pairs: &[(Direction, Direction)],
+        budget: Option<&Budget>,
+    ) -> Vec<Vec<[f32; 2]>> {
+        let equation = budget.map(Equation::new);
+        let asked: Vec<_> = pairs.iter().flat_map(|(i, v)| places(*i, *v)).collect();
+        let mut all = vec![vec![[0.0f32; 2]; self.channels.count()]; pairs.len()];
+        for (channels, fit) in &self.groups {
+            let found = fit.at_all(&asked);
+            let (found, _) = found.as_chunks::<PLACES>();
+            for ((about, out), (light, view)) in found.iter().zip(&mut all).zip(pairs) {
+                for (c, channel) in channels.iter().enumerate() {
+                    let (value, noise) = (about[0].0[c], about[0].1[c]);
+                    let known = equation.as_ref().map_or(0.0, |equation| {
+                        let shape = shape(&about.map(|(value, _)| value[c]));
+                        let effects = equation.at(&Slant::of(*light), &Slant::of(*view), &shape);
+                        value
+                            * effects
+                                .u(Part::Direction)
+                                .hypotenuse(effects.u(Part::Scale))
+                    });
+                    out[*channel] = [value as f32, noise.hypotenuse(known) as f32];
+                }
+            }
+        }
+        all
     }
 
     /// The value of each channel at many pairs of light and view, by all threads.
