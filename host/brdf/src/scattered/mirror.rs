@@ -105,9 +105,17 @@ pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
     };
     let around = best as f64 * STEP_DEG;
     let at = |azimuth_deg: f64| level(&residuals(azimuth_deg));
-    let (mut low, mut high) = (around - STEP_DEG, around + STEP_DEG);
+    let azimuth_deg = least(at, around - STEP_DEG, around + STEP_DEG);
+    Mirror {
+        plane: Some(MirrorPlane::at_deg(azimuth_deg)),
+        is_determined,
+    }
+}
+
+/// Where a function of an azimuth is least between two, by the golden section.
+fn least(at: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-    let mut found = inner.map(at);
+    let mut found = inner.map(&at);
     while high - low > NEAR_DEG {
         if found[0] < found[1] {
             high = inner[1];
@@ -119,8 +127,5 @@ pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
             found = [found[1], at(inner[1])];
         }
     }
-    Mirror {
-        plane: Some(MirrorPlane::at_deg(0.5 * (low + high))),
-        is_determined,
-    }
+    0.5 * (low + high)
 }
