@@ -7,18 +7,12 @@ use crate::symmetry::SymmetryArgument;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
-use gonia_formats::dense::{
-    ERRORS_OF, check_dense_name, write_channel_errors, write_dense, write_dense_channels,
-    write_error_bars,
-};
-use gonia_formats::samples::{SampleValues, read_channels_of_all};
+use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense_channels, write_error_bars};
+use gonia_formats::samples::read_channels_of_all;
 use gonia_formats::{check_output, checksum, is_same_file};
 use gonia_pipeline::provenance::Provenance;
-use gonia_pipeline::{
-    DirectionalAlbedo, FillCounts, FillMethod, FillOptions, Filled, FilledFile, fill,
-    fill_channels, fill_channels_to_file, fill_to_file,
-};
-use gonia_rig::{ChannelSamples, Channels, SampleSet, Scale};
+use gonia_pipeline::{DirectionalAlbedo, FillAccount, FillMethod, FillOptions, fill, fill_to_file};
+use gonia_rig::{Channels, SampleValues, Scale};
 use std::path::{Path, PathBuf};
 
 /// Interpolates samples to every cell of the grid.
@@ -133,16 +127,9 @@ impl Fill {
         let mut facts = read.provenance;
         facts.insert("samples".to_owned(), names.clone());
         let channels = read.values.channels().clone();
-        let filled = match read.values {
-            SampleValues::Rgb(samples) => {
-                let samples = SampleSet { samples, scale };
-                self.fill_colours(samples, &options, facts, &progress)
-            }
-            SampleValues::Channels(samples) => {
-                self.fill_channels(samples, scale, &options, facts, &progress)
-            }
-        };
-        let mut rows = filled.with_context(|| names)?;
+        let filled = self.fill(read.values, scale, &options, facts, &progress);
+        let account = filled.with_context(|| names)?;
+        let mut rows = self.describe(&account, &channels, scale);
         rows.insert(3, ("cells".into(), table::count(grid.n_cells() as u64)));
         if channels != Channels::Rgb {
             rows.insert(4, ("channels".into(), channels.to_string()));
@@ -156,44 +143,23 @@ impl Fill {
         Ok(())
     }
 
-    /// Fills samples of colours and writes what was asked for; returns what to print of it.
-    fn fill_colours(
+    /// Fills the grid and writes what was asked for.
+    fn fill(
         &self,
-        samples: SampleSet,
-        options: &FillOptions,
-        facts: Provenance,
-        progress: &Progress,
-    ) -> Result<Vec<(String, String)>> {
-        if options.fits_memory()? {
-            let filled = fill(samples, options, &progress.watch())?;
-            return self.write(filled, facts, progress);
-        }
-        let scale = samples.scale;
-        let filled = fill_to_file(samples, options, &self.output, &facts, &progress.watch())?;
-        Ok(describe_file(&filled, scale))
-    }
-
-    /// The same of other channels.
-    fn fill_channels(
-        &self,
-        samples: ChannelSamples,
+        samples: SampleValues,
         scale: Scale,
         options: &FillOptions,
         facts: Provenance,
         progress: &Progress,
-    ) -> Result<Vec<(String, String)>> {
+    ) -> Result<FillAccount> {
         let watch = progress.watch();
-        if !options.channels_fit_memory(&samples.channels)? {
-            let filled =
-                fill_channels_to_file(samples, scale, options, &self.output, &facts, &watch)?;
-            return Ok(describe_file(&filled, scale));
+        if !options.fits_memory(samples.channels())? {
+            let account = fill_to_file(samples, scale, options, &self.output, &facts, &watch)?;
+            remarks::print(&account.remarks);
+            return Ok(account);
         }
-        let filled = fill_channels(samples, scale, options, &watch)?;
-        remarks::print(&filled.remarks);
-        let mut rows = describe(&filled.counts, &filled.settings);
-        rows.extend(origins(&filled.origins));
-        rows.insert(4, ("symmetry".into(), filled.symmetry));
-        rows.push(highest(&filled.albedo, scale));
+        let filled = fill(samples, scale, options, &watch)?;
+        remarks::print(&filled.account.remarks);
         let mut file = filled.dense;
         let mut error_facts = file.provenance.clone();
         if self.error.is_some() {
@@ -206,53 +172,37 @@ impl Fill {
         })?;
         if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
             progress.stage("writing the error bars", |_| {
-                write_channel_errors(path, file.grid, bars, scale, &error_facts)
+                write_error_bars(path, file.grid, bars, scale, &error_facts)
             })?;
         }
-        Ok(rows)
+        Ok(filled.account)
     }
 
-    /// Writes what was asked for, and describes it.
-    fn write(
+    /// What became of the samples and of the cells, as rows.
+    fn describe(
         &self,
-        filled: Filled,
-        facts: Provenance,
-        progress: &Progress,
-    ) -> Result<Vec<(String, String)>> {
-        remarks::print(&filled.remarks);
-        let mut rows = describe(&filled.counts, &filled.settings);
-        rows.extend(origins(&filled.origins));
-        rows.insert(4, ("symmetry".into(), filled.symmetry));
-        rows.push(albedo(&filled.albedo, filled.dense.scale));
+        account: &FillAccount,
+        channels: &Channels,
+        scale: Scale,
+    ) -> Vec<(String, String)> {
+        let count = |n: usize| table::count(n as u64);
+        let counts = &account.counts;
+        let mut rows = vec![
+            ("samples binned".to_owned(), count(counts.binned)),
+            ("samples outside the grid".into(), count(counts.outside)),
+            ("bins filled".into(), count(counts.bins)),
+            ("settings".into(), account.settings.clone()),
+            ("symmetry".into(), account.symmetry.clone()),
+        ];
+        rows.extend(origins(&account.origins));
+        rows.push(albedo(&account.albedo, channels, scale));
         if let FillMethod::Cellwise(_) = self.method {
-            rows.extend([
-                (
-                    "failed, given the nearest value".into(),
-                    table::count(filled.counts.failed),
-                ),
-                (
-                    "not positive, raised".into(),
-                    table::count(filled.counts.raised),
-                ),
-            ]);
+            let failed = table::count(counts.failed);
+            let raised = table::count(counts.raised);
+            rows.push(("failed, given the nearest value".into(), failed));
+            rows.push(("not positive, raised".into(), raised));
         }
-        let mut file = filled.dense;
-        let (grid, scale) = (file.brdf.grid(), file.scale);
-        let mut error_facts = file.provenance.clone();
-        if self.error.is_some() {
-            let of = checksum::of_brdf(&file.brdf);
-            error_facts.insert(ERRORS_OF.to_owned(), of);
-        }
-        file.provenance.extend(facts);
-        progress.stage("writing the dense BRDF", |_| {
-            write_dense(&self.output, file).map(drop)
-        })?;
-        if let (Some(path), Some(bars)) = (&self.error, filled.errors) {
-            progress.stage("writing the error bars", |_| {
-                write_error_bars(path, grid, bars, scale, &error_facts)
-            })?;
-        }
-        Ok(rows)
+        rows
     }
 
     /// The files of samples, for people.
@@ -260,17 +210,6 @@ impl Fill {
         let name = |path: &PathBuf| Path::display(path).to_string();
         self.samples.iter().map(name).collect::<Vec<_>>().join(" ")
     }
-}
-
-/// What became of the samples.
-fn describe(counts: &FillCounts, settings: &str) -> Vec<(String, String)> {
-    let count = |n: usize| table::count(n as u64);
-    vec![
-        ("samples binned".to_owned(), count(counts.binned)),
-        ("samples outside the grid".into(), count(counts.outside)),
-        ("bins filled".into(), count(counts.bins)),
-        ("settings".into(), settings.to_owned()),
-    ]
 }
 
 /// Where the cells' values come from.
@@ -289,43 +228,26 @@ fn origins(counts: &OriginCounts) -> [(String, String); 4] {
     .map(|(name, text)| (name.to_owned(), text))
 }
 
-/// What was written row by row.
-fn describe_file(filled: &FilledFile, scale: Scale) -> Vec<(String, String)> {
-    remarks::print(&filled.remarks);
-    let mut rows = describe(&filled.counts, &filled.settings);
-    rows.extend(origins(&filled.origins));
-    rows.push(match filled.albedo.channel_name.as_str() {
-        "R" | "G" | "B" => albedo(&filled.albedo, scale),
-        _ => highest(&filled.albedo, scale),
-    });
-    rows
-}
-
-/// The highest share of the light that is reflected, of channels that are no colours.
-fn highest(albedo: &DirectionalAlbedo, scale: Scale) -> (String, String) {
-    (
-        format!("directional albedo{}", relative(scale)),
-        format!(
-            "highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
-            albedo.highest, albedo.channel_name, albedo.theta_i_deg, albedo.phi_i_deg
-        ),
-    )
-}
-
-fn relative(scale: Scale) -> &'static str {
-    match scale {
+/// The share of the light that is reflected: of colours in green at three polar angles, and the highest of all.
+fn albedo(albedo: &DirectionalAlbedo, channels: &Channels, scale: Scale) -> (String, String) {
+    let relative = match scale {
         Scale::Absolute => "",
         Scale::Relative => " (relative)",
-    }
-}
-
-/// The share of the light that is reflected, in green at three polar angles, and the highest of all.
-fn albedo(albedo: &DirectionalAlbedo, scale: Scale) -> (String, String) {
-    let [at_0, at_30, at_60] = [0.0, 30.0, 60.0].map(|theta| albedo.at(theta)[1]);
+    };
+    let at = |theta: f64| albedo.at(theta).get(1).copied().unwrap_or_default();
+    let green = match channels {
+        Channels::Rgb => format!(
+            "{:.3}, {:.3}, {:.3} (G at theta_i 0, 30, 60); ",
+            at(0.0),
+            at(30.0),
+            at(60.0)
+        ),
+        _ => String::new(),
+    };
     (
-        format!("directional albedo{}", relative(scale)),
+        format!("directional albedo{relative}"),
         format!(
-            "{at_0:.3}, {at_30:.3}, {at_60:.3} (G at theta_i 0, 30, 60); highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
+            "{green}highest {:.3} ({} at theta_i {:.0}, phi_i {:.0})",
             albedo.highest, albedo.channel_name, albedo.theta_i_deg, albedo.phi_i_deg
         ),
     )

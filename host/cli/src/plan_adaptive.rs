@@ -9,7 +9,7 @@ use gonia_pipeline::{FillOptions, fill};
 use gonia_plan::adaptive;
 use gonia_plan::adaptive::{Proposal, Reach};
 use gonia_protocol::settings::{Axis, Key};
-use gonia_rig::{Rig, SampleSet, Scale};
+use gonia_rig::{Rig, Scale};
 use std::path::PathBuf;
 
 /// Step of the grid whose error bars decide, degrees: a frame spans several cells.
@@ -37,18 +37,18 @@ pub fn propose(rig: &Rig, samples: &[PathBuf], n: usize, keep_out_deg: f64) -> R
              gonia capture and gonia process write them"
         );
     }
-    let set = SampleSet {
-        samples: read.samples,
-        scale: read.scale.unwrap_or(Scale::Relative),
-    };
+    let scale = read.scale.unwrap_or(Scale::Relative);
     let options = FillOptions {
         with_errors: true,
         ..FillOptions::with_step_deg(STEP_DEG)
     };
-    let filled = fill(set, &options, &progress.watch())?;
-    remarks::print(&filled.remarks);
-    let bars = filled.errors.context("the fill gave no error bars")?;
-    let (grid, relative) = (filled.dense.brdf.grid(), bars.relative(&filled.dense.brdf));
+    let filled = fill(read.samples, scale, &options, &progress.watch())?;
+    remarks::print(&filled.account.remarks);
+    let relative = filled.relative_errors();
+    let (grid, relative) = (
+        filled.dense.grid,
+        relative.context("the fill gave no error bars")?,
+    );
     let highest = f64::from(Key::SoftMax.default_of(Axis::Theta)) * 1e-6;
     let reach = Reach {
         light_m: rig.light.distance_m,

@@ -7,9 +7,9 @@ use anyhow::{Context, Result};
 use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
-use gonia_formats::samples::{SampleValues, read_channels};
-use gonia_pipeline::{fit_of_samples, fits_of_channels};
-use gonia_rig::{ChannelSamples, Channels, Remark};
+use gonia_formats::samples::read_channels;
+use gonia_pipeline::FitOfSamples;
+use gonia_rig::{Channels, Remark};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -65,14 +65,7 @@ impl Query {
     fn ask_samples(self) -> Result<()> {
         let read = read_channels(&self.dense)?;
         remarks::print(&read.remarks);
-        let channels = read.values.channels().clone();
-        let samples = match read.values {
-            SampleValues::Rgb(samples) => samples,
-            SampleValues::Channels(mut samples) => {
-                return self.ask_channels(&mut samples);
-            }
-        };
-        let (fit, said_of_it) = fit_of_samples(samples, self.symmetry.into())
+        let (fit, said_of_it) = FitOfSamples::new(read.values, self.symmetry.into())
             .with_context(|| self.dense.display().to_string())?;
         remarks::print(&said_of_it);
         let choice = fit.choice();
@@ -80,35 +73,8 @@ impl Query {
         let rows = asked()?;
         let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
         let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = header(&mut out, &channels);
-        for (asked, (value, _)) in rows.into_iter().zip(fit.at_all(&pairs)) {
-            said = said.and_then(|()| row(&mut out, asked.angles_deg, &value.map(|v| v as f32)));
-        }
-        say::written(said.and_then(|()| out.flush()))
-    }
-
-    /// Samples of other channels than colours: one symmetry for all, three channels a fit.
-    fn ask_channels(&self, samples: &mut ChannelSamples) -> Result<()> {
-        let (fits, said_of_it) = fits_of_channels(samples, self.symmetry.into())
-            .with_context(|| self.dense.display().to_string())?;
-        remarks::print(&said_of_it);
-        if let Some((_, fit)) = fits.first() {
-            let choice = fit.choice();
-            errln!("{} ({})", choice.settings, choice.reason);
-        }
-        let rows = asked()?;
-        let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
-        let mut values = vec![vec![0.0f32; samples.channels.count()]; rows.len()];
-        for (channels, fit) in &fits {
-            for (values, (value, _)) in values.iter_mut().zip(fit.at_all(&pairs)) {
-                for (channel, value) in channels.iter().zip(value) {
-                    values[*channel] = value as f32;
-                }
-            }
-        }
-        let mut out = BufWriter::new(std::io::stdout().lock());
-        let mut said = header(&mut out, &samples.channels);
-        for (asked, values) in rows.into_iter().zip(values) {
+        let mut said = header(&mut out, fit.channels());
+        for (asked, values) in rows.into_iter().zip(fit.at_all(&pairs)) {
             said = said.and_then(|()| row(&mut out, asked.angles_deg, &values));
         }
         say::written(said.and_then(|()| out.flush()))

@@ -2,11 +2,9 @@
 //!
 //! A file is recognised by its first bytes, else by its ending; a name to write to by its ending.
 
-use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, TakeRow};
-pub use crate::format::{ChannelErrors, SeenRow};
+use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
+pub use crate::format::{ChannelErrors, MakeRows, RowsNote, TakeRow};
 use crate::{FileError, table};
-use gonia_brdf::interpolate::{AnyKernel, ByRows, ErrorBars, NewBlock};
-use gonia_brdf::progress::Progress;
 use gonia_brdf::{Direction, Grid};
 use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
 use std::collections::BTreeMap;
@@ -60,47 +58,19 @@ pub fn write_dense_channels(path: &Path, file: &DenseChannels) -> Result<(), Fil
     (writer_of_name(path)?.channels)(path, file)
 }
 
-/// What the file of a dense BRDF that is made row by row says of it.
-pub struct RowsNote<'a> {
-    /// What the channels are: as many as the rows have.
-    pub channels: &'a Channels,
-    /// Whether the values are 1/sr.
-    pub scale: Scale,
-    /// Where the data came from, by name.
-    pub provenance: &'a BTreeMap<String, String>,
-}
-
-/// Writes a dense BRDF whole that does not fit memory, row by row as they are made. `seen` gets each row too
-/// (its number and the values of each channel), in no order and from several threads; `progress` the share
-/// that is done, 0 ..= 1.
+/// Writes a dense BRDF whole that does not fit memory, as it is made: `make` gives rows of light to a function, in
+/// no order and from several threads, all channels of a row at once or some of them. Every channel of every row is
+/// to be given.
 ///
 /// # Errors
-/// As [`write_dense`].
-pub fn write_dense_by_rows<const N: usize>(
+/// As [`write_dense`], and `make`'s own.
+pub fn write_dense_by_rows(
     path: &Path,
     grid: Grid,
-    rows: &ByRows<'_, N>,
     note: &RowsNote<'_>,
-    seen: SeenRow<'_>,
-    progress: &Progress<'_>,
-) -> Result<(), FileError>
-where
-    dyn AnyKernel: NewBlock<N>,
-{
-    let make = |take: &TakeRow<'_>| {
-        let cancelled = || std::io::Error::other("cancelled");
-        let both = |light, row: [&[f32]; N]| {
-            seen(light, &row);
-            take(light, &row)
-        };
-        rows.each_row(progress, &both, cancelled)
-    };
-    let RowsNote {
-        channels,
-        scale,
-        provenance,
-    } = *note;
-    (writer_of_name(path)?.by_rows)(path, grid, channels, scale, provenance, &make)
+    make: MakeRows<'_>,
+) -> Result<(), FileError> {
+    (writer_of_name(path)?.by_rows)(path, grid, note, make)
 }
 
 /// Writes the standard errors of a dense BRDF whole, in the unit of its values, with each cell's
@@ -109,25 +79,6 @@ where
 /// # Errors
 /// As [`write_dense`].
 pub fn write_error_bars(
-    path: &Path,
-    grid: Grid,
-    bars: ErrorBars,
-    scale: Scale,
-    provenance: &BTreeMap<String, String>,
-) -> Result<(), FileError> {
-    let bars = ChannelErrors {
-        channels: Channels::Rgb,
-        standard_error: bars.standard_error.into(),
-        origin: bars.origin,
-    };
-    write_channel_errors(path, grid, bars, scale, provenance)
-}
-
-/// [`write_error_bars`] of any channels.
-///
-/// # Errors
-/// As [`write_dense`].
-pub fn write_channel_errors(
     path: &Path,
     grid: Grid,
     bars: ChannelErrors,

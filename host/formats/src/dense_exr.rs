@@ -3,7 +3,9 @@
 
 use crate::exr_planes::{ExrPlanes, PREFIX, Plane, SCALE};
 use crate::exr_rows::{RowReader, write_rows};
-use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format, MakeRows, TakeRow};
+use crate::format::{
+    CellReader, Content, DenseFormat, DenseWriter, Format, MakeRows, RowsNote, TakeRow,
+};
 use crate::{FileError, error_exr, exr_planes};
 use gonia_brdf::{DenseBrdf, Grid};
 use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
@@ -59,41 +61,38 @@ fn write(path: &Path, file: DenseFile) -> Result<DenseFile, FileError> {
 /// Row by row: what is held in memory is one row beside the planes.
 fn write_channels(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
     let side = file.grid.n_directions();
-    let make = |take: &TakeRow<'_>| {
+    let channels: Vec<usize> = (0..file.channels.count()).collect();
+    let mut make = |take: &TakeRow<'_>| {
         (0..side).try_for_each(|light| {
             let rows: Vec<&[f32]> = file
                 .planes
                 .iter()
                 .filter_map(|plane| plane.get(light * side..(light + 1) * side))
                 .collect();
-            if rows.len() < file.channels.count() {
+            if rows.len() < channels.len() {
                 return Err(std::io::Error::other("a plane is smaller than the grid"));
             }
-            take(light, &rows)
+            take(light, &channels, &rows)
         })
     };
-    write_by_rows(
-        path,
-        file.grid,
-        &file.channels,
-        file.scale,
-        &file.provenance,
-        &make,
-    )
+    let note = RowsNote {
+        channels: &file.channels,
+        scale: file.scale,
+        provenance: &file.provenance,
+    };
+    write_by_rows(path, file.grid, &note, &mut make)
 }
 
 fn write_by_rows(
     path: &Path,
     grid: Grid,
-    channels: &Channels,
-    scale: Scale,
-    provenance: &BTreeMap<String, String>,
+    note: &RowsNote<'_>,
     make: MakeRows<'_>,
 ) -> Result<(), FileError> {
-    let attributes = exr_planes::own_attributes(scale, provenance);
-    let (side, names) = (grid.n_directions(), channels.names());
+    let attributes = exr_planes::own_attributes(note.scale, note.provenance);
+    let (side, names) = (grid.n_directions(), note.channels.names());
     write_rows(path, side, &names, &attributes, |writer| {
-        make(&|light, row: &[&[f32]]| writer.write(light, row))
+        make(&|light, channels: &[usize], row: &[&[f32]]| writer.write(light, channels, row))
     })
 }
 

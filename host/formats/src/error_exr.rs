@@ -57,6 +57,7 @@ fn write_rows_of(
     let mut names = channels.names();
     names.push(ORIGIN.to_owned());
     write_rows(path, side, &names, attributes, |writer| {
+        let channels: Vec<usize> = (0..names.len()).collect();
         let mut origins = Vec::with_capacity(side);
         for (light, row) in origin.chunks_exact(side).enumerate() {
             origins.clear();
@@ -69,7 +70,7 @@ fn write_rows_of(
             if rows.len() < names.len() {
                 return Err(std::io::Error::other("a plane is smaller than the grid"));
             }
-            writer.write(light, &rows)?;
+            writer.write(light, &channels, &rows)?;
         }
         Ok(())
     })

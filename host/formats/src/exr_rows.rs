@@ -38,20 +38,36 @@ pub(super) struct RowWriter<'a> {
 }
 
 impl RowWriter<'_> {
-    /// Writes a row, from any thread: the values of each channel. Each row is to be written once.
-    pub fn write(&self, row: usize, values: &[&[f32]]) -> io::Result<()> {
+    /// Writes some channels of a row, from any thread: their numbers, and the values of each. Each channel of each
+    /// row is to be written once.
+    pub fn write(&self, row: usize, channels: &[usize], values: &[&[f32]]) -> io::Result<()> {
         let size = 4 * self.order.len() * self.width;
-        let mut bytes = Vec::with_capacity(ROW_HEAD as usize + size);
+        let start = self.start + row as u64 * (ROW_HEAD + size as u64);
+        let mut bytes = Vec::with_capacity(ROW_HEAD as usize + 4 * channels.len() * self.width);
         bytes.extend((row as i32).to_le_bytes());
         bytes.extend((size as i32).to_le_bytes());
-        for channel in &self.order {
-            bytes.extend(values[*channel].iter().flat_map(|v| v.to_le_bytes()));
+        // Channels that follow each other in the file are written at once, the first ones with the row's head.
+        let mut pieces = vec![(start, bytes)];
+        let mut next = 0;
+        for (place, channel) in self.order.iter().enumerate() {
+            let Some(k) = channels.iter().position(|c| c == channel) else {
+                continue;
+            };
+            if place != next {
+                let before = ROW_HEAD + 4 * (place * self.width) as u64;
+                pieces.push((start + before, Vec::new()));
+            }
+            next = place + 1;
+            if let Some((_, bytes)) = pieces.last_mut() {
+                bytes.extend(values[k].iter().flat_map(|v| v.to_le_bytes()));
+            }
         }
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(
-            self.start + row as u64 * (ROW_HEAD + size as u64),
-        ))?;
-        file.write_all(&bytes)
+        for (at, bytes) in pieces {
+            file.seek(SeekFrom::Start(at))?;
+            file.write_all(&bytes)?;
+        }
+        Ok(())
     }
 }
 
@@ -247,7 +263,9 @@ mod tests {
         write_rows(&path, side, &Channels::Rgb.names(), &attributes, |writer| {
             for row in (0..side).rev() {
                 let planes = [0, 1, 2].map(|c| plane(c, row));
-                writer.write(row, &planes.each_ref().map(Vec::as_slice))?;
+                let [red, green, blue] = planes.each_ref().map(Vec::as_slice);
+                writer.write(row, &[0, 1], &[red, green])?;
+                writer.write(row, &[2], &[blue])?;
             }
             Ok(())
         })
@@ -294,7 +312,7 @@ mod tests {
             write_rows(&path, 12, &Channels::Rgb.names(), &attributes, |writer| {
                 (0..12)
                     .rev()
-                    .try_for_each(|k| writer.write(k, &[&row[..]; 3]))
+                    .try_for_each(|k| writer.write(k, &[0, 1, 2], &[&row[..]; 3]))
             })
             .unwrap();
             let header = planes.len() - 12 * (16 + 12 * 12);
@@ -318,7 +336,7 @@ mod tests {
             12,
             &Channels::Rgb.names(),
             &BTreeMap::new(),
-            |writer| (0..12).try_for_each(|k| writer.write(k, &[&row[..]; 3])),
+            |writer| (0..12).try_for_each(|k| writer.write(k, &[0, 1, 2], &[&row[..]; 3])),
         )
         .unwrap();
         let length = std::fs::metadata(&path).unwrap().len();
@@ -337,7 +355,7 @@ mod tests {
             12,
             &Channels::Rgb.names(),
             &BTreeMap::new(),
-            |writer| (0..12).try_for_each(|k| writer.write(k, &[&row[..]; 3])),
+            |writer| (0..12).try_for_each(|k| writer.write(k, &[0, 1, 2], &[&row[..]; 3])),
         )
         .unwrap();
         let reader = RowReader::open(&path).unwrap().unwrap();

@@ -4,7 +4,7 @@
 
 use crate::FileError;
 use gonia_brdf::{Brdf, Grid, Sample};
-use gonia_rig::{ChannelSamples, Channels, DenseChannels, DenseFile, Remark, Scale};
+use gonia_rig::{ChannelSamples, Channels, DenseChannels, DenseFile, Remark, SampleValues, Scale};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
@@ -57,24 +57,24 @@ pub(crate) struct DenseWriter {
 pub(crate) type OpenCells = fn(&Path) -> Result<Option<Box<dyn CellReader>>, FileError>;
 
 /// See [`crate::dense::write_dense_by_rows`].
-pub(crate) type WriteRows = fn(
-    &Path,
-    Grid,
-    &Channels,
-    Scale,
-    &BTreeMap<String, String>,
-    MakeRows<'_>,
-) -> Result<(), FileError>;
+pub(crate) type WriteRows = fn(&Path, Grid, &RowsNote<'_>, MakeRows<'_>) -> Result<(), FileError>;
+
+/// What the file of a dense BRDF that is made row by row says of it.
+pub struct RowsNote<'a> {
+    /// What the channels are.
+    pub channels: &'a Channels,
+    /// Whether the values are 1/sr.
+    pub scale: Scale,
+    /// Where the data came from, by name.
+    pub provenance: &'a BTreeMap<String, String>,
+}
 
 /// Makes all rows of a dense BRDF and gives each to a function, in no order and from several threads.
-pub(crate) type MakeRows<'a> = &'a dyn Fn(&TakeRow<'_>) -> io::Result<()>;
+pub type MakeRows<'a> = &'a mut dyn FnMut(&TakeRow<'_>) -> io::Result<()>;
 
-/// Takes a row of light: its number, and of each channel the values of its views.
-pub(crate) type TakeRow<'a> = dyn Fn(usize, &[&[f32]]) -> io::Result<()> + Sync + 'a;
-
-/// Gets every row of light (its number, and of each channel the values of its views), in no order and from
-/// several threads.
-pub type SeenRow<'a> = &'a (dyn Fn(usize, &[&[f32]]) + Sync);
+/// Takes a row of light in some channels: its number, the numbers of the channels, and of each the values of all
+/// views.
+pub type TakeRow<'a> = dyn Fn(usize, &[usize], &[&[f32]]) -> io::Result<()> + Sync + 'a;
 
 /// Standard errors of a dense BRDF of any channels.
 pub struct ChannelErrors {
@@ -116,59 +116,6 @@ pub struct SamplesRead {
     pub provenance: BTreeMap<String, String>,
     /// What was assumed of the file, and what in it cannot be trusted.
     pub remarks: Vec<Remark>,
-}
-
-/// The samples of a file: colours, or what else its columns are.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SampleValues {
-    /// Of red, green and blue.
-    Rgb(Vec<Sample>),
-    /// Of other channels.
-    Channels(ChannelSamples),
-}
-
-impl SampleValues {
-    /// What the values are of.
-    pub fn channels(&self) -> &Channels {
-        match self {
-            Self::Rgb(_) => &Channels::Rgb,
-            Self::Channels(samples) => &samples.channels,
-        }
-    }
-
-    /// How many samples.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Rgb(samples) => samples.len(),
-            Self::Channels(samples) => samples.places.len(),
-        }
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The frame numbers, to be changed.
-    pub(crate) fn frames_mut(&mut self) -> Box<dyn Iterator<Item = &mut u32> + '_> {
-        match self {
-            Self::Rgb(samples) => Box::new(samples.iter_mut().map(|s| &mut s.frame)),
-            Self::Channels(samples) => Box::new(samples.places.iter_mut().map(|s| &mut s.frame)),
-        }
-    }
-
-    /// Appends samples; `false`, and nothing is done, where their channels are others.
-    pub(crate) fn append(&mut self, more: &mut Self) -> bool {
-        match (self, more) {
-            (Self::Rgb(all), Self::Rgb(more)) => all.append(more),
-            (Self::Channels(all), Self::Channels(more)) if all.channels == more.channels => {
-                all.places.append(&mut more.places);
-                all.values.append(&mut more.values);
-            }
-            _ => return false,
-        }
-        true
-    }
 }
 
 /// Samples of any channels as a file holds them.

@@ -1,12 +1,11 @@
 //! An array of numpy's as samples: which of its elements is which number of which sample.
 
 use crate::FileError;
-use crate::format::SampleValues;
 use crate::npy::{NpyHeader, shape_text};
 use crate::npy_type::{ElementType, Field, NumberType};
 use crate::sample_columns::{NumberRow, SampleColumns};
 use crate::sample_rows::{BadRow, frame_of_number, sample_from_row};
-use gonia_rig::Remark;
+use gonia_rig::{Remark, SampleValues};
 use std::io::{self, Read};
 use std::ops::RangeInclusive;
 use std::path::Path;

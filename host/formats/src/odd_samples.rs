@@ -1,9 +1,9 @@
 //! What is said of samples that cannot stand as their file has them.
 
-use crate::format::{ChannelsRead, SampleValues};
+use crate::format::ChannelsRead;
 use crate::{FileError, samples_csv, table};
 use gonia_brdf::Sample;
-use gonia_rig::{Oddity, Remark, keep_sound};
+use gonia_rig::{Oddity, Remark, SampleValues};
 use std::path::Path;
 
 /// Leaves out what has no direction above the sample or no value, turns negative polar angles, and
@@ -12,10 +12,11 @@ use std::path::Path;
 /// # Errors
 /// More than half would be left out.
 pub(crate) fn sort_out(path: &Path, read: &mut ChannelsRead) -> Result<(), FileError> {
-    let (azimuths_are_polar, odd) = match &mut read.values {
-        SampleValues::Rgb(samples) => (are_polar(samples), keep_sound(samples)),
-        SampleValues::Channels(samples) => (are_polar(&samples.places), samples.keep_sound()),
+    let azimuths_are_polar = match &read.values {
+        SampleValues::Rgb(samples) => are_polar(samples),
+        SampleValues::Channels(samples) => are_polar(&samples.places),
     };
+    let odd = read.values.keep_sound();
     let exchanged = odd.no_angle.count > 0 && azimuths_are_polar;
     let kinds = [
         (

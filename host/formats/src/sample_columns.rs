@@ -1,9 +1,8 @@
 //! Which column of a table holds what of a sample, and the sample that a row makes.
 
 use crate::column_name::{Quantity, column_name};
-use crate::format::SampleValues;
 use crate::sample_rows::{BadRow, COLUMNS, place_from_row, sample_from_row};
-use gonia_rig::{ChannelSamples, Channels, Remark};
+use gonia_rig::{ChannelSamples, Channels, Remark, SampleValues};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 

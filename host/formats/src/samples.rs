@@ -4,13 +4,13 @@
 //! where it is unknown. What is read is wider: other names, units, separators, types and orders.
 //! Written are float32 `.npy` of N × 7 or N × 8, and `.csv` with these names in a header.
 
-pub use crate::format::{ChannelsRead, SampleNote, SampleValues, SamplesRead};
+pub use crate::format::{ChannelsRead, SampleNote, SamplesRead};
 
 use crate::format::{Content, ReadSamples, SampleFormat, SampleWriter};
 use crate::sample_rows::LAST_FRAME;
 use crate::{FileError, odd_samples, sample_note, samples_csv, table};
 use gonia_brdf::Sample;
-use gonia_rig::{ChannelSamples, Scale};
+use gonia_rig::{ChannelSamples, SampleValues, Scale};
 use std::path::{Path, PathBuf};
 
 /// Endings besides `.csv` under which a table of text is read, with a header or without.

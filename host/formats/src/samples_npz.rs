@@ -1,10 +1,10 @@
 //! Samples as an array in an `.npz`, numpy's archive of arrays.
 
 use crate::FileError;
-use crate::format::{ChannelsRead, Content, Format, SampleFormat, SampleValues};
+use crate::format::{ChannelsRead, Content, Format, SampleFormat};
 use crate::npy::{self, NpyHeader};
 use crate::npy_samples::{NotSamples, RowError, SampleArray};
-use gonia_rig::Remark;
+use gonia_rig::{Remark, SampleValues};
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;

@@ -19,11 +19,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 // ANCHOR: measure
 fn measure(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let samples = samples_of_folder(folder, &silent)?.into_sample_set();
-    let filled = fill(samples, &FillOptions::with_step_deg(10.0), &silent)?;
+    let measured = samples_of_folder(folder, &silent)?.into_sample_set();
+    let options = FillOptions::with_step_deg(10.0);
+    let filled = fill(measured.samples, measured.scale, &options, &silent)?;
     let light = Direction::from_deg(30.0, 45.0);
     let view = Direction::from_deg(60.0, 225.0);
-    let rgb = filled.dense.brdf.lookup(light, view);
+    let rgb = filled.dense.lookup(light, view);
     println!("f = {rgb:.4?}, {}", filled.dense.scale);
     Ok(())
 }

@@ -6,7 +6,7 @@ use gonia_brdf::interpolate::Kernel;
 use gonia_brdf::model::Kurt;
 use gonia_brdf::{Brdf, Sample};
 use gonia_pipeline::{FillOptions, Options, Side, Table, compare, fill, silent};
-use gonia_rig::{SampleSet, Scale, Stratum};
+use gonia_rig::{Scale, Stratum};
 use std::error::Error;
 
 // ANCHOR: kernel
@@ -37,8 +37,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..usual
     };
     for (name, options) in [("Matérn 3/2", usual), ("Matérn 5/2", own)] {
-        let filled = fill(samples_of(&fabric), &options, &silent)?;
-        let table = Table::from(&filled.dense);
+        let filled = fill(samples_of(&fabric), Scale::Absolute, &options, &silent)?;
+        let dense = filled.into_rgb()?;
+        let table = Table::from(&dense);
         let figures = compare(table, Side::Model(&fabric), &Options::default())?;
         let interior = figures.stratum(Stratum::Interior).map(|row| row.log_rms);
         println!(
@@ -51,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 // ANCHOR_END: main
 
 /// One sample a pose, of every second pose of the paper's plan.
-fn samples_of(material: &dyn Brdf) -> SampleSet {
+fn samples_of(material: &dyn Brdf) -> Vec<Sample> {
     let (lights, views) = (paper_lights(), paper_views());
     let poses = lights
         .iter()
@@ -60,10 +61,7 @@ fn samples_of(material: &dyn Brdf) -> SampleSet {
         let f = material.eval(light.to_vec3(), view.to_vec3());
         Sample::new(light, view, f.map(|v| v as f32)).in_frame(frame as u32)
     });
-    SampleSet {
-        samples: samples.collect(),
-        scale: Scale::Absolute,
-    }
+    samples.collect()
 }
 
 #[test]

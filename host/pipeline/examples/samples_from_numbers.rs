@@ -2,7 +2,7 @@
 
 use gonia_brdf::{Direction, Sample};
 use gonia_pipeline::{FillOptions, fill, silent};
-use gonia_rig::{SampleSet, Scale};
+use gonia_rig::Scale;
 use std::error::Error;
 
 // ANCHOR: main
@@ -17,20 +17,20 @@ fn main() -> Result<(), Box<dyn Error>> {
             samples.push(Sample::new(at(theta_i, phi_i), at(theta_v, phi_v), [f; 3]));
         }
     }
-    let set = SampleSet {
-        samples,
-        scale: Scale::Absolute,
-    };
-    let filled = fill(set, &FillOptions::with_step_deg(10.0), &silent)?;
+    let options = FillOptions::with_step_deg(10.0);
+    let filled = fill(samples, Scale::Absolute, &options, &silent)?;
     let (light, view) = (
         Direction::from_deg(40.0, 10.0),
         Direction::from_deg(35.0, 200.0),
     );
     let (found, truth) = (
-        filled.dense.brdf.lookup(light, view)[0],
+        filled.dense.lookup(light, view)[0],
         glossy(40.0, 10.0, 35.0, 200.0),
     );
-    println!("f = {found:.4} 1/sr, true {truth:.4}; {}", filled.settings);
+    println!(
+        "f = {found:.4} 1/sr, true {truth:.4}; {}",
+        filled.account.settings
+    );
     Ok(())
 }
 // ANCHOR_END: main

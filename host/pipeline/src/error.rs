@@ -6,6 +6,7 @@ use crate::progress::Cancelled;
 use gonia_brdf::fit::FitError;
 use gonia_brdf::interpolate::FillError;
 use gonia_formats::FileError;
+use gonia_rig::Channels;
 
 /// Any error of this library. Each says in one line what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +66,9 @@ pub enum Error {
         /// Frames with a number.
         frames: usize,
     },
+    /// Colours are asked for of what has none.
+    #[error("the BRDF has no R, G, B but {0}; see its bands as colours first")]
+    NoColours(Channels),
     /// A format means 1/sr, and the values are relative.
     #[error(
         "the BRDF is relative, and the format {format} means 1/sr: give the factor that makes it so (--assume-scale 1 takes the values as they are)"

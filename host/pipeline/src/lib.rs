@@ -4,10 +4,10 @@
 //! use gonia_brdf::Direction;
 //! use gonia_pipeline::{FillOptions, fill, samples_of_folder, silent};
 //!
-//! let samples = samples_of_folder("capture".as_ref(), &silent)?.into_sample_set();
-//! let filled = fill(samples, &FillOptions::with_step_deg(4.0), &silent)?;
+//! let measured = samples_of_folder("capture".as_ref(), &silent)?.into_sample_set();
+//! let filled = fill(measured.samples, measured.scale, &FillOptions::with_step_deg(4.0), &silent)?;
 //! let (light, view) = (Direction::from_deg(30.0, 45.0), Direction::from_deg(60.0, 225.0));
-//! println!("{:?} {}", filled.dense.brdf.lookup(light, view), filled.dense.scale);
+//! println!("{:?} {}", filled.dense.lookup(light, view), filled.dense.scale);
 //! # Ok::<(), gonia_pipeline::Error>(())
 //! ```
 //!
@@ -15,8 +15,8 @@
 //! |---|---|---|
 //! | [`samples_of_folder`], [`samples_of`] | a capture folder, or any [`FrameSource`](process::FrameSource) | samples, and what became of each frame |
 //! | [`calibrate()`] | a capture folder's frames | the rig's geometry, with uncertainties |
-//! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples or bins | a dense BRDF, with standard errors where asked for |
-//! | [`fit_of_samples`] | few samples | a fit that is asked anywhere, without a grid |
+//! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples of any channels, or bins | a dense BRDF, with standard errors where asked for |
+//! | [`FitOfSamples`] | few samples | a fit that is asked anywhere, without a grid |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
 //! | [`export`] | a dense BRDF | a file in another group's format, and what was lost |
@@ -39,7 +39,6 @@ mod doubts;
 mod error;
 pub mod export;
 mod fill;
-mod fill_channels;
 pub mod fit;
 pub mod process;
 mod progress;
@@ -53,11 +52,8 @@ pub use compare_bands::{BandFigures, compare_bands};
 pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
-    FillCounts, FillMethod, FillOptions, Filled, FilledBins, FilledFile, fill, fill_bins,
-    fill_to_file, fit_of_samples,
-};
-pub use fill_channels::{
-    ChannelFits, FilledChannels, fill_channels, fill_channels_to_file, fits_of_channels,
+    FillAccount, FillCounts, FillMethod, FillOptions, Filled, FilledBins, FitOfSamples, fill,
+    fill_bins, fill_to_file,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

@@ -7,7 +7,7 @@ use gonia_brdf::model::{Brdf, Material};
 use gonia_brdf::random::Random;
 use gonia_brdf::{Direction, Grid, Sample, SymmetryKind};
 use gonia_pipeline::{Error, FillOptions, fill, silent};
-use gonia_rig::{SampleSet, Scale};
+use gonia_rig::Scale;
 
 /// Pairs of directions as people measure them.
 #[derive(Clone, Copy, Debug)]
@@ -61,12 +61,13 @@ fn all_said(samples: &[Sample]) -> Result<Vec<String>, Error> {
         method: "nearest".parse().unwrap(),
         ..FillOptions::with_step_deg(30.0)
     };
-    let set = SampleSet {
-        samples: samples.to_vec(),
-        scale: Scale::Relative,
-    };
-    let filled = fill(set, &options, &silent)?;
-    Ok(filled.remarks.iter().map(ToString::to_string).collect())
+    let filled = fill(samples.to_vec(), Scale::Relative, &options, &silent)?;
+    Ok(filled
+        .account
+        .remarks
+        .iter()
+        .map(ToString::to_string)
+        .collect())
 }
 
 /// The same but for what their layout leaves to guess.
@@ -316,17 +317,18 @@ fn with_highlight(layout: Layout, share: f64) -> Vec<Sample> {
 
 #[test]
 fn one_azimuth_is_assumed_to_be_isotropic_and_the_result_says_so() {
-    let set = |samples: Vec<Sample>| SampleSet {
-        samples,
-        scale: Scale::Relative,
-    };
     let samples = with_highlight(Layout::OneAzimuth, 0.0);
     let options = FillOptions {
         with_errors: true,
         ..FillOptions::with_step_deg(30.0)
     };
-    let filled = fill(set(samples.clone()), &options, &silent).unwrap();
-    let said: Vec<String> = filled.remarks.iter().map(ToString::to_string).collect();
+    let filled = fill(samples.clone(), Scale::Relative, &options, &silent).unwrap();
+    let said: Vec<String> = filled
+        .account
+        .remarks
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     assert!(
         said.iter().any(|s| s.contains("assumed to be isotropic")),
         "{said:?}"
@@ -344,17 +346,22 @@ fn one_azimuth_is_assumed_to_be_isotropic_and_the_result_says_so() {
             Direction::from_deg(60.0, phi + 150.0),
         )
     };
-    let lookup = |(light, view)| f64::from(filled.dense.brdf.lookup(light, view)[1]);
+    let lookup = |(light, view)| f64::from(filled.dense.lookup(light, view)[1]);
     assert_eq!(lookup(at(180.0)), lookup(at(60.0)));
     let n = Grid::with_step_deg(30.0).unwrap().n_cells() as u64;
-    assert!(filled.origins.extrapolated < n / 2);
+    assert!(filled.account.origins.extrapolated < n / 2);
 
     let none = FillOptions {
         symmetry: Some(SymmetryKind::None),
         ..FillOptions::with_step_deg(30.0)
     };
-    let filled = fill(set(samples), &none, &silent).unwrap();
-    let said: Vec<String> = filled.remarks.iter().map(ToString::to_string).collect();
+    let filled = fill(samples, Scale::Relative, &none, &silent).unwrap();
+    let said: Vec<String> = filled
+        .account
+        .remarks
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     assert!(
         said.iter().any(|s| s.contains("was not measured")),
         "{said:?}"
@@ -367,7 +374,7 @@ fn a_symmetry_that_samples_contradict_is_remarked_on_and_one_that_they_show_is_n
     for (share, contradicted) in [(0.0, false), (0.1, true)] {
         let samples = with_highlight(Layout::Scattered(600), share);
         let (fit, remarks) =
-            gonia_pipeline::fit_of_samples(samples, Some(SymmetryKind::Isotropic)).unwrap();
+            gonia_pipeline::FitOfSamples::new(samples, Some(SymmetryKind::Isotropic)).unwrap();
         assert!(fit.choice().settings.symmetry.is_isotropic());
         let said: Vec<String> = remarks.iter().map(ToString::to_string).collect();
         let found = said.iter().any(|s| s.contains("contradict the symmetry"));

@@ -10,7 +10,7 @@
 //! | [`CameraModel`], [`Homography`] | from millimetres on the target to pixels |
 //! | [`Frame`], [`RawFrame`], [`FrameRow`], [`Exposure`], [`Role`] | frames, and what is known of each |
 //! | [`SampleSet`], [`Scale`], [`DenseFile`], [`CellMask`] | a dense BRDF with its scale and its measured cells |
-//! | [`Channels`], [`ChannelSamples`], [`DenseChannels`] | colours, one value, or the bands of a spectrum; samples and a dense BRDF of these |
+//! | [`Channels`], [`SampleValues`], [`ChannelSamples`], [`DenseChannels`] | colours, one value, or the bands of a spectrum; samples and a dense BRDF of these |
 //! | [`keep_sound`], [`Oddities`] | samples that cannot stand as they came |
 //! | [`Remark`] | what is said of data that were used all the same |
 //! | [`Stratum`], [`Figures`] | how far one BRDF is from another, by part of the domain |
@@ -37,6 +37,7 @@ mod remark;
 mod rig;
 mod rig_error;
 mod sample_set;
+mod sample_values;
 mod scale;
 mod sensor;
 mod sound_samples;
@@ -66,6 +67,7 @@ pub use rig::{
 };
 pub use rig_error::RigError;
 pub use sample_set::SampleSet;
+pub use sample_values::SampleValues;
 pub use scale::Scale;
 pub use sensor::{Bayer, Sensor};
 pub use sound_samples::{Oddities, Oddity, keep_sound};

@@ -23,8 +23,7 @@ use gonia_formats::{Summary, cell_mask, check_writable, checksum};
 use gonia_pipeline::process::{FrameSource, Masks, Processed};
 use gonia_pipeline::provenance::{Provenance, of_this_program};
 use gonia_pipeline::{
-    FillOptions, Options, Side, Table, calibrate, compare, compare_bands, fill, fill_channels,
-    samples_of,
+    FillOptions, Options, Side, Table, calibrate, compare, compare_bands, fill, samples_of,
 };
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
@@ -249,19 +248,17 @@ impl Run {
     ) -> Result<(Summary, DenseFile, CellMask)> {
         let mut summary = summary::start(self.material.what, session, &processed, self.poses.len());
         let options = FillOptions::with_step_deg(step_deg);
-        let filled = fill(
-            processed.into_sample_set(),
-            &options,
-            &self.progress.watch(),
-        )?;
-        remarks::print(&filled.remarks);
-        let mut file = filled.dense;
+        let scale = processed.scale();
+        let filled = fill(processed.samples, scale, &options, &self.progress.watch())?;
+        let account = &filled.account;
+        remarks::print(&account.remarks);
+        let cells = filled.cells.iter().map(|cell| *cell as usize);
+        let measured = CellMask::from_cells(filled.dense.grid, cells);
+        cell_mask::write_mask(&self.path(MEASURED), &measured)?;
+        summary::count_cells(&mut summary, account.counts.binned as u64, &measured);
+        let mut file = filled.into_rgb()?;
         file.provenance.extend(self.facts());
         summary.provenance = file.provenance.clone();
-        let cells = filled.cells.iter().map(|cell| *cell as usize);
-        let measured = CellMask::from_cells(file.brdf.grid(), cells);
-        cell_mask::write_mask(&self.path(MEASURED), &measured)?;
-        summary::count_cells(&mut summary, filled.counts.binned as u64, &measured);
         let dense = self.progress.stage("writing the dense BRDF", |_| {
             write_dense(&self.path(DENSE), file)
         })?;
@@ -283,12 +280,12 @@ impl Run {
             write_noted_channels(&self.path(BAND_SAMPLES), &samples, &note)
         })?;
         let options = FillOptions::with_step_deg(step_deg);
-        if !options.channels_fit_memory(&samples.channels)? {
+        if !options.fits_memory(&samples.channels)? {
             let command = format!("gonia fill {BAND_SAMPLES} -o {BAND_DENSE}");
             return Ok(vec![("bands: to be filled by".to_owned(), command)]);
         }
-        let filled = fill_channels(samples, processed.scale(), &options, &self.progress.watch())?;
-        remarks::print(&filled.remarks);
+        let filled = fill(samples, processed.scale(), &options, &self.progress.watch())?;
+        remarks::print(&filled.account.remarks);
         let mut dense = filled.dense;
         dense.provenance.extend(self.facts());
         let truth = bands::truth(dense.grid, self.material.brdf.as_ref(), &wavelengths);

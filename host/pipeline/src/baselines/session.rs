@@ -13,7 +13,7 @@ use gonia_brdf::{Bins, DenseBrdf, Grid, Sample};
 use gonia_formats::baselines_toml::{BaselineRow, BaselineTable};
 use gonia_formats::checksum;
 use gonia_render::Tabulated;
-use gonia_rig::{DenseFile, Figures, SampleSet, Scale};
+use gonia_rig::{DenseFile, Figures, Scale};
 use std::time::Instant;
 
 /// A measurement, and what its baselines are made with.
@@ -236,13 +236,10 @@ impl Measurement {
         progress: &Progress<'_>,
     ) -> Result<(BaselineRow, DenseBrdf), Error> {
         let numbers = samples.len() as u64;
-        let set = SampleSet {
-            samples,
-            scale: Scale::Relative,
-        };
         let options = FillOptions::with_step_deg(self.grid.step_deg());
         let start = Instant::now();
-        let brdf = fill(set, &options, progress)?.dense.brdf;
+        let filled = fill(samples, Scale::Relative, &options, progress)?;
+        let brdf = filled.into_rgb()?.brdf;
         let seconds = start.elapsed().as_secs_f64();
         let row = BaselineRow {
             name: name.to_owned(),

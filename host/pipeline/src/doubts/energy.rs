@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalAlbedo {
     /// Mean over the azimuths of light, per channel, by the grid's polar angles.
-    pub by_polar_angle: Vec<[f64; 3]>,
+    pub by_polar_angle: Vec<Vec<f64>>,
     /// The highest of all directions of light within what was measured.
     pub highest: f64,
     /// The channel of the highest, by its number …
@@ -31,29 +31,38 @@ pub struct DirectionalAlbedo {
 impl DirectionalAlbedo {
     /// Sums a BRDF; the highest albedo is looked for up to a polar angle of light.
     pub fn of(brdf: &DenseBrdf, up_to_deg: f64) -> Self {
-        let grid = brdf.grid();
-        let (n, rings) = (grid.n_directions(), Rings::of(grid));
-        let of_light = |light: usize| {
-            let row = |c: usize| &brdf.planes()[c][light * n..(light + 1) * n];
-            rings.albedo([0, 1, 2].map(row))
-        };
-        let all: Vec<[f64; 3]> = (0..n).into_par_iter().map(of_light).collect();
-        Self::of_lights(grid, &all, up_to_deg)
+        Self::of_planes(brdf.grid(), brdf.planes(), &Channels::Rgb, up_to_deg)
     }
 
-    /// Of the albedos of all directions of light, in the grid's order.
-    fn of_lights(grid: Grid, all: &[[f64; 3]], up_to_deg: f64) -> Self {
+    /// The same of any channels.
+    pub(crate) fn of_channels(brdf: &DenseChannels, up_to_deg: f64) -> Self {
+        Self::of_planes(brdf.grid, &brdf.planes, &brdf.channels, up_to_deg)
+    }
+
+    fn of_planes(grid: Grid, planes: &[Vec<f32>], channels: &Channels, up_to_deg: f64) -> Self {
+        let (n, rings) = (grid.n_directions(), Rings::of(grid));
+        let of_light = |light: usize| {
+            let row = |plane: &Vec<f32>| rings.albedo(&plane[light * n..(light + 1) * n]);
+            planes.iter().map(row).collect()
+        };
+        let all: Vec<Vec<f64>> = (0..n).into_par_iter().map(of_light).collect();
+        Self::of_lights(grid, &all, channels, up_to_deg)
+    }
+
+    /// Of the albedos of all directions of light, in the grid's order, each of every channel.
+    fn of_lights(grid: Grid, all: &[Vec<f64>], channels: &Channels, up_to_deg: f64) -> Self {
         let (n_phi, step_deg) = (grid.n_phi(), grid.step_deg());
-        let by_polar_angle = all
-            .chunks(n_phi)
-            .map(|ring| [0, 1, 2].map(|c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64))
-            .collect();
+        let of_ring = |ring: &[Vec<f64>]| {
+            let of_channel = |c| ring.iter().map(|a| a[c]).sum::<f64>() / n_phi as f64;
+            (0..channels.count()).map(of_channel).collect()
+        };
+        let by_polar_angle = all.chunks(n_phi).map(of_ring).collect();
         let measured = ((up_to_deg / step_deg).round() as usize + 1) * n_phi;
         let (mut highest, mut channel, mut place) = (f64::NEG_INFINITY, 0, 0);
         for (light, albedo) in all.iter().enumerate().take(measured) {
-            for c in 0..3 {
-                if albedo[c] > highest {
-                    (highest, channel, place) = (albedo[c], c, light);
+            for (c, albedo) in albedo.iter().enumerate() {
+                if *albedo > highest {
+                    (highest, channel, place) = (*albedo, c, light);
                 }
             }
         }
@@ -62,7 +71,7 @@ impl DirectionalAlbedo {
             by_polar_angle,
             highest,
             channel,
-            channel_name: ["R", "G", "B"][channel].to_owned(),
+            channel_name: channels.names().get(channel).cloned().unwrap_or_default(),
             theta_i_deg: light.theta_deg(),
             phi_i_deg: light.phi_deg(),
             step_deg,
@@ -70,40 +79,10 @@ impl DirectionalAlbedo {
     }
 
     /// The mean over azimuths at a polar angle of light, per channel: of the nearest node.
-    pub fn at(&self, theta_i_deg: f64) -> [f64; 3] {
+    pub fn at(&self, theta_i_deg: f64) -> &[f64] {
         let last = self.by_polar_angle.len().saturating_sub(1);
         let nearest = ((theta_i_deg / self.step_deg).round() as usize).min(last);
-        self.by_polar_angle
-            .get(nearest)
-            .copied()
-            .unwrap_or([0.0; 3])
-    }
-
-    /// Of the channel that reflects most among those of a dense BRDF.
-    pub(crate) fn of_channels(brdf: &DenseChannels, up_to_deg: f64) -> Self {
-        let n = brdf.grid.n_directions();
-        let of_channel = |(channel, plane): (usize, &Vec<f32>)| {
-            let sums = AlbedoRows::new(brdf.grid);
-            plane
-                .par_chunks(n)
-                .enumerate()
-                .for_each(|(light, row)| sums.add(light, [row, &[], &[]]));
-            let albedo = sums.finish(up_to_deg);
-            Self { channel, ..albedo }
-        };
-        let all = brdf.planes.iter().enumerate().map(of_channel);
-        let highest = all.max_by(|a, b| a.highest.total_cmp(&b.highest));
-        let albedo = highest.unwrap_or_else(|| AlbedoRows::new(brdf.grid).finish(up_to_deg));
-        albedo.named(&brdf.channels)
-    }
-
-    /// The same with the name that the channel has among some.
-    pub(crate) fn named(self, channels: &Channels) -> Self {
-        let name = channels.names().get(self.channel).cloned();
-        Self {
-            channel_name: name.unwrap_or_default(),
-            ..self
-        }
+        self.by_polar_angle.get(nearest).map_or(&[], Vec::as_slice)
     }
 }
 
@@ -111,24 +90,32 @@ impl DirectionalAlbedo {
 pub(crate) struct AlbedoRows {
     grid: Grid,
     rings: Rings,
-    lights: Mutex<Vec<[f64; 3]>>,
+    channels: Channels,
+    /// Of each direction of light the albedo of every channel.
+    lights: Mutex<Vec<Vec<f64>>>,
 }
 
 impl AlbedoRows {
-    pub fn new(grid: Grid) -> Self {
+    pub fn new(grid: Grid, channels: &Channels) -> Self {
         Self {
             grid,
             rings: Rings::of(grid),
-            lights: Mutex::new(vec![[0.0; 3]; grid.n_directions()]),
+            channels: channels.clone(),
+            lights: Mutex::new(vec![vec![0.0; channels.count()]; grid.n_directions()]),
         }
     }
 
-    /// Adds the row of a direction of light.
-    pub fn add(&self, light: usize, row: [&[f32]; 3]) {
-        let albedo = self.rings.albedo(row);
+    /// Adds the row of a direction of light in some channels.
+    pub fn add(&self, light: usize, channels: &[usize], row: &[&[f32]]) {
+        let albedos: Vec<f64> = row.iter().map(|values| self.rings.albedo(values)).collect();
         let mut lights = self.lights.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(place) = lights.get_mut(light) {
-            *place = albedo;
+        let Some(of_light) = lights.get_mut(light) else {
+            return;
+        };
+        for (channel, albedo) in channels.iter().zip(albedos) {
+            if let Some(place) = of_light.get_mut(*channel) {
+                *place = albedo;
+            }
         }
     }
 
@@ -136,7 +123,7 @@ impl AlbedoRows {
     pub fn finish(self, up_to_deg: f64) -> DirectionalAlbedo {
         let lights = self.lights.into_inner();
         let lights = lights.unwrap_or_else(PoisonError::into_inner);
-        DirectionalAlbedo::of_lights(self.grid, &lights, up_to_deg)
+        DirectionalAlbedo::of_lights(self.grid, &lights, &self.channels, up_to_deg)
     }
 }
 
@@ -155,14 +142,11 @@ impl Rings {
     }
 
     /// ∫ f cos θv dωv of the values of all views.
-    fn albedo(&self, row: [&[f32]; 3]) -> [f64; 3] {
-        row.map(|values| {
-            values
-                .chunks(self.n_phi)
-                .zip(&self.weights)
-                .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
-                .sum()
-        })
+    fn albedo(&self, row: &[f32]) -> f64 {
+        row.chunks(self.n_phi)
+            .zip(&self.weights)
+            .map(|(ring, weight)| weight * ring.iter().map(|f| f64::from(*f)).sum::<f64>())
+            .sum()
     }
 }
 
@@ -233,13 +217,12 @@ mod tests {
         let brdf = DenseBrdf::from_fn(grid, |light, view| {
             [0, 1, 2].map(|c| (light + c * view) as f32)
         });
-        let rows = AlbedoRows::new(grid);
+        let rows = AlbedoRows::new(grid, &Channels::Rgb);
         let n = grid.n_directions();
         for light in (0..n).rev() {
-            rows.add(
-                light,
-                [0, 1, 2].map(|c| &brdf.planes()[c][light * n..(light + 1) * n]),
-            );
+            let row = |c: usize| &brdf.planes()[c][light * n..(light + 1) * n];
+            rows.add(light, &[2, 0], &[row(2), row(0)]);
+            rows.add(light, &[1], &[row(1)]);
         }
         assert_eq!(rows.finish(75.0), DirectionalAlbedo::of(&brdf, 75.0));
     }

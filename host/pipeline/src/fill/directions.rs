@@ -1,0 +1,94 @@
+//! A fit of samples that is asked at any directions, without a grid in between.
+
+use super::groups::{groups, spread_over};
+use crate::Error;
+use crate::doubts;
+use gonia_brdf::interpolate::FillError;
+use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
+use gonia_brdf::{Direction, SymmetryKind};
+use gonia_rig::{Channels, Remark, SampleValues};
+
+/// More samples than this are not asked without a grid.
+const SAMPLES_AT_MOST: usize = 1_000_000;
+
+/// A fit of samples of any channels, which has a value at any directions.
+pub struct FitOfSamples {
+    channels: Channels,
+    /// Fits of some of the channels, each with the numbers of its three.
+    groups: Vec<([usize; 3], ScatteredFit)>,
+    choice: Choice,
+}
+
+impl FitOfSamples {
+    /// Fits samples, and says what is to be said of them. One symmetry is taken for all channels: the one asked
+    /// for, or what the samples show.
+    ///
+    /// # Errors
+    /// Samples that contradict what they are taken for, or too few or too many of them.
+    pub fn new(
+        samples: impl Into<SampleValues>,
+        symmetry: Option<SymmetryKind>,
+    ) -> Result<(Self, Vec<Remark>), Error> {
+        let mut samples = samples.into();
+        let mut remarks = doubts::of_oddities(&samples.keep_sound());
+        let n = samples.channels().count();
+        let spread = samples.three(spread_over(n));
+        remarks.extend(doubts::of_samples(&spread)?);
+        if spread.len() > SAMPLES_AT_MOST {
+            return Err(Error::Contradicted {
+                what: format!(
+                    "{} samples are more than the {SAMPLES_AT_MOST} that can be asked without a grid",
+                    spread.len()
+                ),
+                remedy: "make a dense BRDF of them with gonia fill, and query that".into(),
+            });
+        }
+        let too_few = FillError::TooFewBins(spread.len());
+        let fit = ScatteredFit::new(&spread, symmetry).ok_or(too_few)?;
+        let choice = fit.choice().clone();
+        remarks.extend(doubts::remarks_on_symmetry(&fit));
+        if choice.reason == Reason::Assumed {
+            remarks.push(doubts::remark_on_assumed_isotropy());
+        }
+        let mut of_all = groups::<3>(n);
+        let groups = if of_all == [spread_over(n)] {
+            of_all
+                .pop()
+                .map(|channels| (channels, fit))
+                .into_iter()
+                .collect()
+        } else {
+            let of_group = |channels| (channels, fit.of_channels(&samples.of_channels(channels)));
+            of_all.into_iter().map(of_group).collect()
+        };
+        let fit = Self {
+            channels: samples.channels().clone(),
+            groups,
+            choice,
+        };
+        Ok((fit, remarks))
+    }
+
+    /// What the values are of.
+    pub fn channels(&self) -> &Channels {
+        &self.channels
+    }
+
+    /// The settings, and why these.
+    pub fn choice(&self) -> &Choice {
+        &self.choice
+    }
+
+    /// The value of each channel at many pairs of light and view, by all threads.
+    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<Vec<f32>> {
+        let mut values = vec![vec![0.0f32; self.channels.count()]; pairs.len()];
+        for (channels, fit) in &self.groups {
+            for (values, (value, _)) in values.iter_mut().zip(fit.at_all(pairs)) {
+                for (channel, value) in channels.iter().zip(value) {
+                    values[*channel] = value as f32;
+                }
+            }
+        }
+        values
+    }
+}

@@ -1,0 +1,115 @@
+//! Samples, read for what they are: sorted out, in bins, with the symmetry that they have.
+
+use super::FillCounts;
+use super::groups::spread_over;
+use super::options::FillOptions;
+use super::origins::Origins;
+use super::symmetry::{scattered_fit, symmetry_of_many};
+use crate::Error;
+use crate::doubts::{self, Isotropy};
+use crate::progress::{Progress, Step, step};
+use gonia_brdf::interpolate::OriginCounts;
+use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit};
+use gonia_brdf::{Bin, Bins, Grid, Symmetry};
+use gonia_rig::{Remark, SampleValues};
+
+/// Samples in their bins, by three channels that stand for all, and what is to be said of them. Doubts, symmetry
+/// and, of up to three channels, the values rest on these.
+pub(super) struct Prepared {
+    pub bins: Bins,
+    samples: usize,
+    /// How many of a sample are in the bins: with its images.
+    images: usize,
+    /// The fit of few samples, or of those of an isotropic material: it takes the place of the bins.
+    pub fit: Option<ScatteredFit>,
+    /// The symmetry, for people and for the provenance …
+    pub symmetry: String,
+    /// … and the images that the bins hold.
+    pub completed_by: Symmetry,
+    pub origins: OriginCounts,
+    pub remarks: Vec<Remark>,
+}
+
+impl Prepared {
+    /// Leaves out of the samples what cannot stand.
+    pub fn new(
+        all: &mut SampleValues,
+        grid: Grid,
+        options: &FillOptions,
+        progress: &Progress<'_>,
+    ) -> Result<Self, Error> {
+        let count = all.len();
+        let mut remarks = doubts::of_oddities(&all.keep_sound());
+        let samples = all.three(spread_over(all.channels().count()));
+        remarks.extend(doubts::of_samples(&samples)?);
+        let fit = scattered_fit(&samples, grid, options, progress)?;
+        let (symmetry, reason) = match (&fit, options.symmetry) {
+            (Some(fit), _) => (fit.choice().settings.symmetry, fit.choice().reason),
+            (None, Some(asked)) => {
+                let (symmetry, said) = symmetry_of_many(&samples, asked);
+                remarks.extend(said);
+                (symmetry, Reason::Asked)
+            }
+            (None, None) => (Symmetry::None, Reason::Untested),
+        };
+        let fit = fit.filter(|fit| {
+            let is_few = fit.places() <= FEW_ANISOTROPIC && !options.asks_for_blocks();
+            let takes_place = symmetry.is_isotropic() || is_few;
+            if takes_place || fit.choice().contradicted_by.is_some() {
+                remarks.extend(doubts::remarks_on_symmetry(fit));
+            }
+            takes_place
+        });
+        let bins = step(progress, Step::Binning, |_| {
+            Ok::<_, Error>(Bins::new(grid, &samples))
+        })?;
+        remarks.extend(doubts::of_bins(&samples, &bins));
+        let isotropy = match (symmetry.is_isotropic(), reason) {
+            (false, _) => Isotropy::No,
+            (_, Reason::Asked) => Isotropy::Asked,
+            (_, Reason::Assumed | Reason::TooFew) => Isotropy::Assumed,
+            _ => Isotropy::Shown,
+        };
+        let images = symmetry.order();
+        let bins = if images > 1 {
+            Bins::new(grid, &symmetry.completed(samples.to_vec()))
+        } else {
+            bins
+        };
+        let origins = Origins::of(&bins, fit.as_ref()).counts();
+        remarks.extend(doubts::remark_on_layout(&samples, &origins, isotropy));
+        Ok(Self {
+            bins,
+            samples: count,
+            images,
+            fit,
+            symmetry: format!("{symmetry}, {reason}"),
+            completed_by: symmetry,
+            origins,
+            remarks,
+        })
+    }
+
+    /// The largest polar angle of light, or by reciprocity of view, that was measured.
+    pub fn highest_deg(&self) -> f64 {
+        let grid = self.bins.grid();
+        let ring = |bin: &Bin| {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            light.max(view) / grid.n_phi()
+        };
+        let highest = self.bins.bins().iter().map(ring).max().unwrap_or(0);
+        highest as f64 * grid.step_deg()
+    }
+
+    pub fn counts(&self) -> FillCounts {
+        let in_bins: usize = self.bins.bins().iter().map(|bin| bin.count as usize).sum();
+        let binned = in_bins / self.images;
+        FillCounts {
+            binned,
+            outside: self.samples - binned,
+            bins: self.bins.bins().len(),
+            failed: 0,
+            raised: 0,
+        }
+    }
+}

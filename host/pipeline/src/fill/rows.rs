@@ -1,0 +1,269 @@
+//! A fill that does not fit memory: written row by row, or a few channels at a time.
+
+use super::blocks::{chosen, sorted};
+use super::groups::{groups, groups_from_middle, spread_over, stand_for_themselves};
+use super::options::FillOptions;
+use super::planes::bins_of;
+use super::prepared::Prepared;
+use super::symmetry::fit_of_others;
+use super::{FillAccount, provenance_of};
+use crate::Error;
+use crate::doubts::{self, AlbedoRows, DirectionalAlbedo};
+use crate::progress::{Progress, Step, step};
+use crate::provenance::Provenance;
+use gonia_brdf::interpolate::{AnyKernel, ByRows, Data, FillSettings, NewBlock};
+use gonia_brdf::scattered::ScatteredFit;
+use gonia_brdf::{Bins, Grid};
+use gonia_formats::dense::{RowsNote, TakeRow, write_dense_by_rows};
+use gonia_rig::{Channels, SampleValues, Scale};
+use std::io;
+use std::path::Path;
+
+/// Fills a grid that does not fit memory, and writes it row by row, or three channels at a time. `facts` are added
+/// to the file's provenance. The values are those of [`fill`](super::fill) on a grid that fits.
+///
+/// # Errors
+/// As [`fill`](super::fill), and when the file cannot be written; no standard errors can be.
+pub fn fill_to_file(
+    samples: impl Into<SampleValues>,
+    scale: Scale,
+    options: &FillOptions,
+    path: &Path,
+    facts: &Provenance,
+    progress: &Progress<'_>,
+) -> Result<FillAccount, Error> {
+    let mut samples = samples.into();
+    let channels = samples.channels().clone();
+    options.check_rows(&channels)?;
+    let (grid, base) = options.check()?;
+    let prepared = Prepared::new(&mut samples, grid, options, progress)?;
+    let n = channels.count();
+    if stand_for_themselves(n) {
+        samples = Vec::new().into();
+    }
+    let rows = ToRows {
+        samples: &samples,
+        channels: &channels,
+        scale,
+        grid,
+        base,
+        path,
+        facts,
+        prepared: &prepared,
+    };
+    let (settings, albedo) = match (&prepared.fit, n) {
+        (Some(fit), _) => rows.write_fit(fit, progress),
+        (None, 1) => rows.write_blocks(&prepared.bins.channel(0), &[[0]], progress),
+        (None, 3) => rows.write_blocks(&prepared.bins, &[[0, 1, 2]], progress),
+        (None, 10..) => rows.write_groups::<31>(progress),
+        (None, _) => rows.write_groups::<3>(progress),
+    }?;
+    let counts = prepared.counts();
+    let mut remarks = prepared.remarks;
+    remarks.extend(doubts::remark_on_energy(&albedo, scale));
+    Ok(FillAccount {
+        counts,
+        settings,
+        symmetry: prepared.symmetry,
+        origins: prepared.origins,
+        albedo,
+        remarks,
+    })
+}
+
+/// A fill that is written row by row.
+struct ToRows<'a> {
+    samples: &'a SampleValues,
+    channels: &'a Channels,
+    scale: Scale,
+    grid: Grid,
+    base: FillSettings,
+    path: &'a Path,
+    facts: &'a Provenance,
+    prepared: &'a Prepared,
+}
+
+/// Which of a group's channels have no values yet: their places in the group, and their numbers.
+struct Fresh {
+    places: Vec<usize>,
+    channels: Vec<usize>,
+}
+
+impl Fresh {
+    fn of(group: &[usize], written: &mut [bool]) -> Self {
+        let (mut places, mut channels) = (Vec::new(), Vec::new());
+        for (place, channel) in group.iter().enumerate() {
+            if !std::mem::replace(&mut written[*channel], true) {
+                places.push(place);
+                channels.push(*channel);
+            }
+        }
+        Self { places, channels }
+    }
+}
+
+/// Why rows are not all written.
+enum Stopped {
+    /// The file does not take them.
+    Writing(io::Error),
+    /// They cannot be made.
+    Making(Error),
+}
+
+impl<E: Into<Error>> From<E> for Stopped {
+    fn from(error: E) -> Self {
+        Stopped::Making(error.into())
+    }
+}
+
+/// Takes of a row of light the values of a group's channels.
+type TakeGroup<'a> = dyn Fn(usize, &Fresh, &[&[f32]]) -> Result<(), Stopped> + Sync + 'a;
+
+impl ToRows<'_> {
+    /// Writes the file whole from what `make` gives; returns the settings, and the albedo of all channels.
+    fn write(
+        &self,
+        settings: String,
+        mut make: impl FnMut(&TakeGroup<'_>) -> Result<(), Stopped>,
+    ) -> Result<(String, DirectionalAlbedo), Error> {
+        let mut provenance = provenance_of(&settings);
+        provenance.insert("symmetry".into(), self.prepared.symmetry.clone());
+        provenance.extend(self.facts.clone());
+        let note = RowsNote {
+            channels: self.channels,
+            scale: self.scale,
+            provenance: &provenance,
+        };
+        let sums = AlbedoRows::new(self.grid, self.channels);
+        // What is not the file's fault comes out as what it was.
+        let mut failed = None;
+        let written = write_dense_by_rows(self.path, self.grid, &note, &mut |take: &TakeRow<
+            '_,
+        >| {
+            let taken = make(&|light, fresh: &Fresh, group: &[&[f32]]| {
+                let rows: Vec<&[f32]> = fresh.places.iter().map(|place| group[*place]).collect();
+                sums.add(light, &fresh.channels, &rows);
+                take(light, &fresh.channels, &rows).map_err(Stopped::Writing)
+            });
+            taken.map_err(|stopped| match stopped {
+                Stopped::Writing(error) => error,
+                Stopped::Making(error) => {
+                    failed = Some(error);
+                    io::Error::other("not made")
+                }
+            })
+        });
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        written?;
+        Ok((settings, sums.finish(self.prepared.highest_deg())))
+    }
+
+    /// Three channels at a time are in memory.
+    fn write_fit(
+        &self,
+        fit: &ScatteredFit,
+        progress: &Progress<'_>,
+    ) -> Result<(String, DirectionalAlbedo), Error> {
+        let (n, side) = (self.channels.count(), self.grid.n_directions());
+        let mut written = vec![false; n];
+        let groups = groups::<3>(n);
+        self.write(fit.choice().settings.to_string(), |take| {
+            step(progress, Step::InterpolatingAndWriting, |share| {
+                for (k, channels) in groups.iter().enumerate() {
+                    if share(k as f64 / groups.len() as f64).is_break() {
+                        return Err(Error::Cancelled.into());
+                    }
+                    let fresh = Fresh::of(channels, &mut written);
+                    let dense = if *channels == spread_over(n) {
+                        fit.dense(self.grid, false).0
+                    } else {
+                        let samples = self.samples.of_channels(*channels);
+                        fit_of_others(fit, &samples, self.grid)
+                            .dense(self.grid, false)
+                            .0
+                    };
+                    for light in 0..side {
+                        let cells = light * side..(light + 1) * side;
+                        take(
+                            light,
+                            &fresh,
+                            &dense.planes().each_ref().map(|plane| &plane[cells.clone()]),
+                        )?;
+                    }
+                }
+                Ok(())
+            })
+        })
+    }
+
+    /// As many channels at a time as share a factorisation.
+    fn write_groups<const N: usize>(
+        &self,
+        progress: &Progress<'_>,
+    ) -> Result<(String, DirectionalAlbedo), Error>
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
+        let groups = groups_from_middle::<N>(self.channels.count());
+        let first = self.bins_of(groups.first().copied().unwrap_or([0; N]), progress)?;
+        self.write_blocks(&first, &groups, progress)
+    }
+
+    /// The bins are those of the first group.
+    fn write_blocks<const N: usize>(
+        &self,
+        first: &Bins<N>,
+        groups: &[[usize; N]],
+        progress: &Progress<'_>,
+    ) -> Result<(String, DirectionalAlbedo), Error>
+    where
+        dyn AnyKernel: NewBlock<N>,
+    {
+        let first = sorted(first, self.base, progress)?;
+        let settings = chosen(&first, self.base, progress)?;
+        let mut written = vec![false; self.channels.count()];
+        self.write(settings.to_string(), |take| {
+            for (k, channels) in groups.iter().enumerate() {
+                let fresh = Fresh::of(channels, &mut written);
+                if k == 0 {
+                    write_group(&first, &settings, &fresh, take, progress)?;
+                } else {
+                    let bins = self.bins_of(*channels, progress)?;
+                    let known = sorted(&bins, settings, progress)?;
+                    write_group(&known, &settings, &fresh, take, progress)?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn bins_of<const N: usize>(
+        &self,
+        channels: [usize; N],
+        progress: &Progress<'_>,
+    ) -> Result<Bins<N>, Error> {
+        let symmetry = self.prepared.completed_by;
+        bins_of(self.samples, channels, symmetry, self.grid, progress)
+    }
+}
+
+fn write_group<const N: usize>(
+    known: &Data<'_, N>,
+    settings: &FillSettings,
+    fresh: &Fresh,
+    take: &TakeGroup<'_>,
+    progress: &Progress<'_>,
+) -> Result<(), Stopped>
+where
+    dyn AnyKernel: NewBlock<N>,
+{
+    let rows = step(progress, Step::FittingBlocks, |share| {
+        ByRows::new(known, settings, share).map_err(Error::from)
+    })?;
+    step(progress, Step::InterpolatingAndWriting, |share| {
+        let taken = |light, row: [&[f32]; N]| take(light, fresh, &row);
+        rows.each_row(share, &taken, || Error::Cancelled.into())
+    })
+}

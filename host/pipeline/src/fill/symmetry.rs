@@ -1,0 +1,78 @@
+//! The symmetry of a material, and the fit of few samples that shows it.
+
+use super::options::{CELLS_IN_MEMORY, FillMethod, FillOptions};
+use crate::Error;
+use crate::doubts;
+use crate::progress::{Progress, Step, step};
+use gonia_brdf::scattered::{ScatteredFit, is_few};
+use gonia_brdf::{Bins, Direction, Grid, Sample, Symmetry, SymmetryKind};
+use gonia_rig::Remark;
+
+/// A fit of few samples, or of those of a material that is said to be isotropic; `None` of others.
+pub(super) fn scattered_fit(
+    samples: &[Sample],
+    grid: Grid,
+    options: &FillOptions,
+    progress: &Progress<'_>,
+) -> Result<Option<ScatteredFit>, Error> {
+    let asked = options.symmetry;
+    let possible = options.method == FillMethod::Blocks && grid.n_cells() <= CELLS_IN_MEMORY;
+    if !possible {
+        return Ok(None);
+    }
+    step(progress, Step::ChoosingSettings, |_| {
+        Ok(if is_few(samples) {
+            ScatteredFit::new(samples, asked)
+        } else if asked == Some(SymmetryKind::Isotropic) {
+            ScatteredFit::new(&few_of(samples, grid), asked)
+        } else {
+            None
+        })
+    })
+}
+
+/// The fit of other channels of the samples that a fit is of.
+pub(super) fn fit_of_others(fit: &ScatteredFit, samples: &[Sample], grid: Grid) -> ScatteredFit {
+    if is_few(samples) {
+        fit.of_channels(samples)
+    } else {
+        fit.of_channels(&few_of(samples, grid))
+    }
+}
+
+/// So many of many samples, at most, are looked at for a plane of symmetry, and for what contradicts it.
+const LOOKED_AT: usize = 6000;
+
+/// The symmetry of many samples that is asked for, with the plane that some of them show, and what these say against
+/// it.
+pub(super) fn symmetry_of_many(samples: &[Sample], asked: SymmetryKind) -> (Symmetry, Vec<Remark>) {
+    if matches!(asked, SymmetryKind::None | SymmetryKind::Isotropic) {
+        return (Symmetry::None, Vec::new());
+    }
+    let step = samples.len().div_ceil(LOOKED_AT).max(1);
+    let some: Vec<Sample> = samples.iter().step_by(step).copied().collect();
+    match ScatteredFit::new(&some, Some(asked)) {
+        Some(fit) => (
+            fit.choice().settings.symmetry,
+            doubts::remarks_on_symmetry(&fit),
+        ),
+        None => (Symmetry::None, Vec::new()),
+    }
+}
+
+/// Of many samples of an isotropic material, the medians of those that share a cell when all are turned to
+/// one azimuth of light.
+fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
+    let turned = samples.iter().map(|s| Sample {
+        phi_i_deg: 0.0,
+        phi_v_deg: (s.phi_v_deg - s.phi_i_deg).rem_euclid(360.0),
+        ..*s
+    });
+    let bins = Bins::new(grid, &turned.collect::<Vec<Sample>>());
+    let bins = bins.bins().iter();
+    bins.map(|bin| {
+        let direction = |v: [f32; 3]| Direction::from_vec3(v.map(f64::from));
+        Sample::new(direction(bin.light), direction(bin.view), bin.median)
+    })
+    .collect()
+}

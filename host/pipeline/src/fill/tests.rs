@@ -1,0 +1,144 @@
+//! Channels of every number, in memory and by rows.
+
+use super::*;
+use crate::progress::silent;
+use gonia_brdf::random::Random;
+use gonia_brdf::{Direction, Elementary, Sample, SymmetryKind};
+use gonia_formats::dense::read_dense_channels;
+use gonia_rig::{ChannelSamples, Channels};
+
+/// Channel c of a broad lobe is c + 1 times its value, to a power that falls with c.
+fn truth(light: Direction, view: Direction, channel: usize, of: usize) -> f32 {
+    let (i, v) = (light.to_vec3(), view.to_vec3());
+    let along = 0.6 + 0.2 * (i[0] + v[0]) + 0.1 * (i[2] * v[2]);
+    let scale = (channel + 1) as f64;
+    (scale * along.power(1.0 + channel as f64 / of as f64)) as f32
+}
+
+fn samples(channels: Channels) -> ChannelSamples {
+    let (n, mut random) = (channels.count(), Random::new(3));
+    let mut samples = ChannelSamples {
+        channels,
+        ..ChannelSamples::default()
+    };
+    for frame in 0..6000 {
+        let mut direction =
+            || Direction::from_deg(random.between(0.0, 80.0), random.between(0.0, 360.0));
+        let (light, view) = (direction(), direction());
+        samples
+            .places
+            .push(Sample::new(light, view, []).in_frame(frame / 20));
+        let values = (0..n).map(|c| truth(light, view, c, n));
+        samples.values.extend(values);
+    }
+    samples
+}
+
+/// Blocks, whatever the samples are.
+fn options(with_errors: bool) -> FillOptions {
+    FillOptions {
+        tolerance: Some(0.7),
+        symmetry: Some(SymmetryKind::None),
+        with_errors,
+        ..FillOptions::with_step_deg(15.0)
+    }
+}
+
+fn bands(n: usize) -> Channels {
+    Channels::Bands((0..n).map(|k| 400.0 + k as f64).collect())
+}
+
+#[test]
+fn channels_of_every_number_have_their_own_values_and_error_bars() {
+    for channels in [Channels::Single, bands(2), bands(5), bands(31), bands(40)] {
+        let n = channels.count();
+        let filled = fill(samples(channels), Scale::Absolute, &options(true), &silent).unwrap();
+        let (grid, errors) = (filled.dense.grid, filled.errors.unwrap());
+        for c in 0..n {
+            let (plane, error) = (&filled.dense.planes[c], &errors.standard_error[c]);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for light in (0..grid.n_directions()).step_by(7) {
+                for view in (0..grid.n_directions()).step_by(5) {
+                    let cell = grid.cell(light, view);
+                    let truth = truth(grid.direction(light), grid.direction(view), c, n);
+                    sum += f64::from(plane[cell] / truth - 1.0).powi(2);
+                    count += 1.0;
+                    assert!(error[cell] > 0.0 && error[cell] < truth);
+                }
+            }
+            let rms = (sum / count).sqrt();
+            assert!(rms < 0.05, "{n} channels, {c}: {rms}");
+        }
+    }
+}
+
+/// What a file by rows and a fill in memory say must be the same.
+fn assert_rows_are_those_in_memory(of: impl Into<SampleValues>, options: &FillOptions) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("d.exr");
+    let (of, scale) = (of.into(), Scale::Relative);
+    let whole = fill(of.clone(), scale, options, &silent).unwrap();
+    let facts = Provenance::from([("rig".to_owned(), "a test".to_owned())]);
+    let rows = fill_to_file(of, scale, options, &path, &facts, &silent).unwrap();
+    let read = read_dense_channels(&path).unwrap();
+    assert_eq!(read.channels, whole.dense.channels);
+    assert!(read.planes == whole.dense.planes, "{}", read.channels);
+    assert_eq!(read.provenance["rig"], "a test");
+    assert_eq!(format!("{rows:?}"), format!("{:?}", whole.account));
+}
+
+#[test]
+fn rows_of_any_number_of_channels_are_those_of_a_fill_in_memory() {
+    for channels in [Channels::Single, bands(5), bands(40)] {
+        assert_rows_are_those_in_memory(samples(channels), &options(false));
+    }
+    let colours = samples(bands(3)).of_channels([0, 1, 2]);
+    assert_rows_are_those_in_memory(colours, &options(false));
+}
+
+#[test]
+fn a_fit_of_few_samples_is_what_rows_are_made_of_too() {
+    let few = few(bands(4), 300);
+    let isotropic = FillOptions {
+        symmetry: Some(SymmetryKind::Isotropic),
+        ..FillOptions::with_step_deg(15.0)
+    };
+    assert_rows_are_those_in_memory(few, &isotropic);
+}
+
+/// The first of the samples, of no frame.
+fn few(channels: Channels, n: usize) -> ChannelSamples {
+    let mut few = samples(channels);
+    few.places.truncate(n);
+    few.values.truncate(n * few.channels.count());
+    for place in &mut few.places {
+        place.frame = Sample::NO_FRAME;
+    }
+    few
+}
+
+#[test]
+fn what_rows_cannot_hold_is_refused_and_leaves_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("d.exr");
+    let refused = |of: ChannelSamples, options: &FillOptions| {
+        let (scale, facts) = (Scale::Relative, Provenance::new());
+        let made = fill_to_file(of, scale, options, &path, &facts, &silent);
+        made.unwrap_err().to_string()
+    };
+    let said = refused(samples(bands(2)), &options(true));
+    assert!(said.starts_with("--error with 2 channels"), "{said}");
+    let said = refused(few(bands(5), 2), &options(false));
+    assert!(said.contains("only 2 bins"), "{said}");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn samples_that_cannot_stand_count_as_outside_in_every_channel() {
+    let mut odd = samples(bands(2));
+    odd.values[7] = f32::NAN;
+    let n = odd.places.len();
+    let filled = fill(odd, Scale::Relative, &options(false), &silent).unwrap();
+    let counts = filled.account.counts;
+    assert_eq!((counts.binned + counts.outside, counts.outside), (n, 1));
+}
