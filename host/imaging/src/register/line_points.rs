@@ -31,6 +31,9 @@ pub struct LinePoint {
 pub enum Search {
     /// A rig as it was drawn: camera rolled by 5°, lines within a seventh of the frame's width.
     Far,
+    /// Nearer than that, with a camera that may be as far off: at oblique views a wide neighbourhood of a line holds
+    /// the one opposite too.
+    Aside,
     /// A rig that is known to a hundredth of the frame's width.
     About,
     /// A calibrated rig: a few pixels.
@@ -50,7 +53,7 @@ impl Registrar {
                 let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
                 (strips, fit)
             }
-            Search::Far | Search::About => {
+            Search::Far | Search::Aside | Search::About => {
                 let (windows, trust) = loose(search, width);
                 let found = windows.iter().find_map(|widths| {
                     self.elsewhere(&shot, &predicted, *widths, (&trust, &|all| all))
@@ -82,7 +85,7 @@ impl Registrar {
 
 /// How far to look, and how far a camera may be from what the rig says.
 fn loose(search: Search, width: f64) -> (&'static [f64], Trust) {
-    let is_far = search == Search::Far;
+    let is_far = search != Search::About;
     let pick = |far: f64, about: f64| if is_far { far } else { about };
     let trust = Trust {
         arm_deg: pick(1.2, 0.3),
@@ -92,11 +95,10 @@ fn loose(search: Search, width: f64) -> (&'static [f64], Trust) {
         model_px: (pick(1e-3, 5e-4) * width).max(5.0 * MODEL_PX),
         ln_scale: pick(0.05, 0.01),
     };
-    // At oblique views a wide neighbourhood of a line holds the one opposite too.
-    let windows: &[f64] = if is_far {
-        &[0.15, 0.08, 0.045]
-    } else {
-        &[0.03]
+    let windows: &[f64] = match search {
+        Search::Far => &[0.15],
+        Search::Aside => &[0.08, 0.045],
+        Search::About | Search::Near => &[0.03],
     };
     (windows, trust)
 }

@@ -150,9 +150,8 @@ impl Light {
         if let Some(unlike) = unlike(&all, typical) {
             return known.by_mirror_or(rig, unlike);
         }
-        let light = LIGHT.len();
         let full = joined(known.camera, &all, &prior, &everything)?;
-        let (was, likely) = (&nominal[..light], &prior[..light]);
+        let (was, likely) = (&nominal[..LIGHT.len()], &prior[..LIGHT.len()]);
         let states = states(&LIGHT, rig, was, likely, &all.shared, &own_of(&full));
         let moves = are_free(&LIGHT, &states);
         let kept = free(&moves, prior.len());
@@ -186,7 +185,7 @@ impl Light {
             residuals,
             from_mirror: mirror.map_or(0.0, |mirror| mirror.misfit(&solved.shared)),
             solution: Some(LightSolution {
-                shared: solved.shared[..light].to_vec(),
+                shared: solved.shared[..LIGHT.len()].to_vec(),
                 covariance,
                 states,
             }),

@@ -40,51 +40,62 @@ struct Borne {
 
 /// The camera that most frames bear out; the rig's own where none shows its lines.
 pub fn first_camera(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Rig, CalibrateError> {
-    let first = from_far_off(rig, rows, look)?;
+    let mut first = from_far_off(rig, rows, look, &[Search::Far, Search::About])?;
+    if first.is_empty() {
+        first = from_far_off(rig, rows, look, &[Search::Aside])?;
+    }
     if first.is_empty() {
         return Ok(rig.clone());
     }
     let bearers = spread(rows, BEARERS);
     let enough = (BORNE_OUT * bearers.len() as f64).ceil() as usize;
-    let mut best = grown(rig, &agreed(rig, &first)?, &bearers, look)?;
-    // Frame by frame: one that shows something else spoils no other's camera.
-    for frame in first.chunks(1).take(STARTS) {
+    let borne = |start: &Rig, searches: &[Search]| {
+        let camera = grown(rig, start, &bearers, (look, searches))?;
+        polished(rig, camera, &bearers, look)
+    };
+    let mut best = borne(&agreed(rig, &first)?, &[Search::About])?;
+    // What is found further off may be something else: only where it is needed, and with other starts, frame by
+    // frame, so that one that shows something else spoils no other's camera.
+    let further = [Search::About, Search::Aside];
+    let others = first.chunks(1).take(STARTS).map(|frame| agreed(rig, frame));
+    let best_so_far = best.camera.clone();
+    for start in std::iter::once(Ok(best_so_far)).chain(others) {
         if best.frames >= enough {
             break;
         }
-        let other = grown(rig, &agreed(rig, frame)?, &bearers, look)?;
+        let other = borne(&start?, &further)?;
         if other.frames > best.frames {
             best = other;
         }
     }
-    polished(rig, best.camera, &bearers, look)
+    Ok(best.camera)
 }
 
 /// Places lines to hundredths of a pixel where a camera sees them, and makes the camera of those, as long as more
 /// frames fit it: from a pixel off, the edge of a material close by is easily taken for the line.
 fn polished(
     rig: &Rig,
-    mut camera: Rig,
+    camera: Rig,
     bearers: &[FrameRow],
     look: &Look<'_>,
-) -> Result<Rig, CalibrateError> {
-    let mut most = 0;
+) -> Result<Borne, CalibrateError> {
+    let mut best = Borne { camera, frames: 0 };
     for _ in 0..ROUNDS {
-        let seen = look.lines(&camera, bearers, &[Search::Near])?;
+        let seen = look.lines(&best.camera, bearers, &[Search::Near])?;
         if seen.is_empty() {
             break;
         }
-        let next = agreed(rig, &seen)?;
-        let fit = seen.iter().filter(|frame| fits(&next, frame)).count();
-        if fit <= most {
+        let camera = agreed(rig, &seen)?;
+        let frames = seen.iter().filter(|frame| fits(&camera, frame)).count();
+        if frames <= best.frames {
             break;
         }
-        (camera, most) = (next, fit);
-        if fit == bearers.len() {
+        best = Borne { camera, frames };
+        if frames == bearers.len() {
             break;
         }
     }
-    Ok(camera)
+    Ok(best)
 }
 
 /// Lines of frames from far off. Frames from above are the plainest; where they are few, the others have to do.
@@ -92,16 +103,17 @@ fn from_far_off(
     rig: &Rig,
     rows: &[FrameRow],
     look: &Look<'_>,
+    searches: &[Search],
 ) -> Result<Vec<LineFrame>, CalibrateError> {
     let order = spread(rows, FIRST);
     let is_left = |row: &&FrameRow| !order.contains(row);
     let rest: Vec<FrameRow> = rows.iter().filter(is_left).cloned().collect();
-    let mut first = look.lines(rig, &order, &[Search::Far, Search::About])?;
+    let mut first = look.lines(rig, &order, searches)?;
     for some in rest.chunks(FIRST) {
         if first.len() >= ENOUGH_FIRST {
             break;
         }
-        first.extend(look.lines(rig, some, &[Search::Far, Search::About])?);
+        first.extend(look.lines(rig, some, searches)?);
     }
     Ok(first)
 }
@@ -111,14 +123,14 @@ fn grown(
     rig: &Rig,
     start: &Rig,
     bearers: &[FrameRow],
-    look: &Look<'_>,
-) -> Result<Borne, CalibrateError> {
+    (look, searches): (&Look<'_>, &[Search]),
+) -> Result<Rig, CalibrateError> {
     let mut best = Borne {
         camera: start.clone(),
         frames: 0,
     };
     for _ in 0..ROUNDS {
-        let seen = look.lines(&best.camera, bearers, &[Search::About, Search::Far])?;
+        let seen = look.lines(&best.camera, bearers, searches)?;
         if seen.is_empty() {
             break;
         }
@@ -132,7 +144,7 @@ fn grown(
             break;
         }
     }
-    Ok(best)
+    Ok(best.camera)
 }
 
 /// The camera that most frames agree with: that of all, or, where it does not fit many, that of a few of them with
