@@ -8,6 +8,7 @@ use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::interpolate::{OriginCounts, Preset};
 use gonia_formats::dense::{ERRORS_OF, check_dense_name, write_dense_channels, write_error_bars};
+use gonia_formats::fit_source::files_of_samples;
 use gonia_formats::samples::read_channels_of_all;
 use gonia_formats::{check_output, checksum, is_same_file};
 use gonia_pipeline::provenance::Provenance;
@@ -126,6 +127,7 @@ impl Fill {
         let scale = read.scale.unwrap_or(Scale::Relative);
         let mut facts = read.provenance;
         facts.insert("samples".to_owned(), names.clone());
+        facts.extend(files_of_samples(&self.output, &self.samples)?);
         let channels = read.values.channels().clone();
         let filled = self.fill(read.values, scale, &options, facts, &progress);
         let account = filled.with_context(|| names)?;
