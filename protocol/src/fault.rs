@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A latched fault. A number rather than an enum, so that a host can show the code of a
-/// newer firmware.
+/// A latched fault, or a warning ([`FaultCode::is_warning`]). A number rather than an enum, so that a host can show the
+/// code of a newer firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FaultCode(pub u16);
@@ -52,8 +52,29 @@ impl FaultCode {
     /// A motor's driver reports an alarm.
     pub const DRIVER_ALARM: Self = Self(14);
 
-    /// Every fault that exists, in the order of its number.
-    pub const PAGES: [FaultPage; 14] = [
+    /// A motor's driver that is set by wire does not answer, or by nonsense.
+    pub const DRIVER_SILENT: Self = Self(15);
+    /// A motor's driver does not hold what was written to it, or is another chip.
+    pub const DRIVER_NOT_SET: Self = Self(16);
+    /// A motor's driver has lost its settings.
+    pub const DRIVER_RESET: Self = Self(17);
+    /// A motor's driver has switched off because it is too hot.
+    pub const DRIVER_TOO_HOT: Self = Self(18);
+    /// A coil of a motor has a short.
+    pub const DRIVER_SHORT: Self = Self(19);
+    /// A motor's driver has too little voltage.
+    pub const DRIVER_UNDERVOLTAGE: Self = Self(20);
+    /// A coil of a motor draws no current.
+    pub const MOTOR_OPEN: Self = Self(21);
+    /// A warning: a motor's driver is warm.
+    pub const DRIVER_WARM: Self = Self(22);
+    /// A warning: an encoder is near its limits.
+    pub const ENCODER_WARNING: Self = Self(23);
+    /// An encoder says that its position is not valid.
+    pub const ENCODER_INVALID: Self = Self(24);
+
+    /// Every fault and warning that exists, in the order of its number.
+    pub const PAGES: [FaultPage; 24] = [
         page(
             Self::ENCODER_LOST,
             "encoder does not answer",
@@ -138,11 +159,90 @@ impl FaultCode {
             "driver too hot, overcurrent, motor cable, supply missing; or the alarm's cable cut",
             "see what the driver shows, mend that, clear the fault, home",
         ),
+        page(
+            Self::DRIVER_SILENT,
+            "motor's driver does not answer",
+            "driver without supply, its wire cut or its jumper not set, driver_kind or driver_address not what is fitted",
+            "check supply, wire, jumpers, driver_kind and driver_address; clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_NOT_SET,
+            "motor's driver does not hold its settings",
+            "interference on its wire, or another chip than driver_kind names",
+            "check the wire, its ground and driver_kind; clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_RESET,
+            "motor's driver has lost its settings",
+            "its supply sagged or was switched off and on",
+            "check the drivers' supply, clear the fault (the settings are written again), home",
+        ),
+        page(
+            Self::DRIVER_TOO_HOT,
+            "motor's driver has switched off, too hot",
+            "run_current too high for its cooling, no air, or a short that heats it",
+            "cool it, lower run_current and hold_current, clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_SHORT,
+            "short at a motor's coil",
+            "motor cable damaged, a coil shorted, a plug moved under power",
+            "power off, check cable and motor, clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_UNDERVOLTAGE,
+            "motor's driver has too little voltage",
+            "supply too weak, or switched off",
+            "check the drivers' supply, clear the fault, home",
+        ),
+        page(
+            Self::MOTOR_OPEN,
+            "a motor's coil draws no current",
+            "motor unplugged, a wire or a coil broken",
+            "check plug, cable and motor with the power off, clear the fault, home",
+        ),
+        page(
+            Self::DRIVER_WARM,
+            "motor's driver above 120 °C",
+            "run_current or hold_current high for its cooling, no air",
+            "give it air, or lower run_current and hold_current, before it switches off",
+        ),
+        page(
+            Self::ENCODER_WARNING,
+            "encoder warns that it is near its limits",
+            "dirt on the ring, distance or temperature near what it allows",
+            "clean the ring, check its distance and temperature at the next stop",
+        ),
+        page(
+            Self::ENCODER_INVALID,
+            "encoder says that its position is not valid",
+            "ring dirty, too far or too near, too fast or too hot",
+            "clean the ring, check its distance, clear the fault, home",
+        ),
     ];
 
     /// The page of this fault, if this build knows it.
     pub fn page(self) -> Option<&'static FaultPage> {
         Self::PAGES.iter().find(|page| page.code == self)
+    }
+
+    /// Whether this is only a warning: it is reported and logged, and the arm goes on.
+    pub fn is_warning(self) -> bool {
+        matches!(self, Self::DRIVER_WARM | Self::ENCODER_WARNING)
+    }
+
+    /// Whether a driver that is set by wire is at fault, so that its current is switched off.
+    pub fn is_of_driver(self) -> bool {
+        matches!(
+            self,
+            Self::DRIVER_SILENT
+                | Self::DRIVER_NOT_SET
+                | Self::DRIVER_RESET
+                | Self::DRIVER_TOO_HOT
+                | Self::DRIVER_SHORT
+                | Self::DRIVER_UNDERVOLTAGE
+                | Self::MOTOR_OPEN
+        )
     }
 
     /// Whether the position is no longer trusted after this fault, so that the arm must be homed.
@@ -153,6 +253,8 @@ impl FaultCode {
                 | Self::HOST_WATCHDOG
                 | Self::SETTINGS_DAMAGED
                 | Self::SETTINGS_NOT_SAVED
+                | Self::DRIVER_WARM
+                | Self::ENCODER_WARNING
         )
     }
 }
@@ -160,7 +262,14 @@ impl FaultCode {
 impl core::fmt::Display for FaultCode {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self.page() {
-            Some(page) => write!(f, "fault {}: {}; {}", self.0, page.symptom, page.cure),
+            Some(page) => {
+                let what = if self.is_warning() {
+                    "warning"
+                } else {
+                    "fault"
+                };
+                write!(f, "{what} {}: {}; {}", self.0, page.symptom, page.cure)
+            }
             None => write!(f, "fault {}, unknown to this host; update it", self.0),
         }
     }

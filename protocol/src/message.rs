@@ -117,7 +117,7 @@ messages! {
 
         /// Something accepted has ended.
         0xC1 Completed(Completed),
-        /// A fault was latched.
+        /// A fault was latched, or a warning given.
         0xC2 Faulted(Faulted),
         /// Where the arm is, now and then.
         0xC3 Telemetry(Telemetry),
@@ -353,7 +353,7 @@ pub struct Completed {
     pub corrections: [u8; 2],
 }
 
-/// A fault was latched.
+/// A fault was latched, or a warning given ([`FaultCode::is_warning`]), which latches nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Faulted {
     /// Number of the event, for counting losses.
@@ -379,7 +379,7 @@ pub struct Telemetry {
     pub encoder_udeg: [i32; 2],
 }
 
-/// An entry of the log: a fault and when it came.
+/// An entry of the log: a fault or a warning, and when it came.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogEntry {
     /// When.

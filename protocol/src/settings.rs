@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of keys.
-pub const N_SETTINGS: usize = 37;
+pub const N_SETTINGS: usize = 43;
 
 /// One of the two axes of an arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -120,6 +120,19 @@ pub enum Key {
     BrakeTime = 35,
     /// What the encoder speaks: 0 for SSI, 1 for BiSS-C.
     EncoderKind = 36,
+    /// How the motor's driver is set: 0 by hand (step and direction, potentiometer, jumpers), 1 a TMC2209 by its
+    /// UART, 2 a TMC5160 by SPI. By wire, the next five are written to it at the start, read back, and watched.
+    DriverKind = 37,
+    /// Address of a TMC2209 by its pins MS1 and MS2: 0 to 3.
+    DriverAddress = 38,
+    /// Current while the motor turns, mA (RMS).
+    RunCurrent = 39,
+    /// Current at rest, mA (RMS): 0.4 s after the last step.
+    HoldCurrent = 40,
+    /// Microsteps of a full step, a power of two. `steps_per_turn` counts these.
+    Microsteps = 41,
+    /// The driver's sense resistors, mΩ: usually 110 on a TMC2209's module, 75 on a TMC5160's.
+    SenseResistor = 42,
 }
 
 /// What a key means.
@@ -330,6 +343,24 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     m(Key::DriverAlarm, "driver_alarm", "", (0, 2), [0; 2]),
     m(Key::BrakeTime, "brake_time", "µs", (0, 1_000_000), [0; 2]),
     m(Key::EncoderKind, "encoder_kind", "", (0, 1), [0; 2]),
+    m(Key::DriverKind, "driver_kind", "", (0, 2), [0; 2]),
+    m(Key::DriverAddress, "driver_address", "", (0, 3), [0; 2]),
+    m(Key::RunCurrent, "run_current", "mA", (50, 5_000), [800; 2]),
+    m(
+        Key::HoldCurrent,
+        "hold_current",
+        "mA",
+        (30, 5_000),
+        [400; 2],
+    ),
+    m(Key::Microsteps, "microsteps", "", (1, 256), [8; 2]),
+    m(
+        Key::SenseResistor,
+        "sense_resistor",
+        "mΩ",
+        (10, 1_000),
+        [110; 2],
+    ),
 ];
 
 /// An amplitude of an error.
@@ -380,6 +411,16 @@ impl Key {
     pub fn meaning(self) -> &'static Meaning {
         &MEANINGS[self as usize]
     }
+
+    /// The keys of a driver that is set by wire.
+    pub const DRIVER: [Key; 6] = [
+        Key::DriverKind,
+        Key::DriverAddress,
+        Key::RunCurrent,
+        Key::HoldCurrent,
+        Key::Microsteps,
+        Key::SenseResistor,
+    ];
 
     /// Whether both axes of a node share one value.
     pub fn is_of_the_node(self) -> bool {

@@ -275,6 +275,12 @@ fn no_setting_has_ever_changed_its_number_or_its_unit() {
         "34 driver_alarm",
         "35 brake_time µs",
         "36 encoder_kind",
+        "37 driver_kind",
+        "38 driver_address",
+        "39 run_current mA",
+        "40 hold_current mA",
+        "41 microsteps",
+        "42 sense_resistor mΩ",
     ];
     assert_eq!(listed, frozen);
 }

@@ -1,11 +1,15 @@
 //! Two axes behind the firmware's hardware trait: everything that one controller is wired to.
 
-use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::driver::{DriverBus, tmc5160};
+use gonia_firmware::hardware::{
+    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+};
 use gonia_firmware::profile::TICKS_PER_US;
 use gonia_firmware::steps::{End, Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
 use gonia_firmware::store::{RECORD_MAX, Sectors, Store, Stored};
 use gonia_protocol::settings::{Axis, Key};
 
+use crate::driver_chip::DriverChip;
 use crate::plant::{AxisPlant, PlantConfig};
 
 /// Pins, encoders and memory of one simulated arm.
@@ -27,9 +31,16 @@ pub struct SimulatedArm {
     was_let_fall: bool,
     /// Until when each driver reports an alarm, µs.
     alarm_until_us: [u64; 2],
+    /// Drivers that are set by wire; `None` where they are set by hand.
+    drivers: [Option<DriverChip>; 2],
+    /// What the drivers answer, and from when on, µs.
+    answers: [Option<(u64, DriverAnswer)>; 2],
     store: Store,
     flash: RamFlash,
 }
+
+/// How long an exchange on the one wire takes at 9600 baud, µs.
+const ONE_WIRE_US: u64 = 16_000;
 
 /// A timer with preloaded registers, in virtual time.
 #[derive(Debug)]
@@ -121,6 +132,8 @@ impl SimulatedArm {
             brakes_released: false,
             was_let_fall: false,
             alarm_until_us: [0; 2],
+            drivers: [None, None],
+            answers: [None, None],
             store: Store::default(),
             flash: RamFlash {
                 sectors: [[0xFF; RECORD_MAX]; 2],
@@ -210,6 +223,16 @@ impl SimulatedArm {
         self.alarm_until_us[axis.index()] = until_us;
     }
 
+    /// Fits drivers that are set by wire, all with address 0: each has a wire of its own.
+    pub fn fit_drivers(&mut self, bus: DriverBus) {
+        self.drivers = [0; 2].map(|_| Some(DriverChip::new(bus, 0)));
+    }
+
+    /// The driver of an axis, if it is set by wire.
+    pub fn driver(&mut self, axis: Axis) -> Option<&mut DriverChip> {
+        self.drivers[axis.index()].as_mut()
+    }
+
     /// Whether the drivers were ever switched off, or not yet on, while the brakes were let go: nothing held
     /// the arm.
     pub fn was_let_fall(&self) -> bool {
@@ -223,9 +246,11 @@ impl SimulatedArm {
 
     fn power_motors(&mut self) {
         self.was_let_fall |= self.brakes_released && !self.drivers_on;
-        for (plant, alarm_until_us) in self.axes.iter_mut().zip(self.alarm_until_us) {
+        let axes = self.axes.iter_mut().zip(&self.drivers);
+        for ((plant, driver), alarm_until_us) in axes.zip(self.alarm_until_us) {
             let has_alarm = self.now_us < alarm_until_us;
-            plant.let_turn(self.drivers_on && self.brakes_released && !has_alarm);
+            let drives = driver.as_ref().is_none_or(DriverChip::drives);
+            plant.let_turn(self.drivers_on && self.brakes_released && !has_alarm && drives);
         }
     }
 
@@ -236,6 +261,7 @@ impl SimulatedArm {
         self.holds_interlock_open = false;
         self.drivers_on = false;
         self.brakes_released = false;
+        self.answers = [None, None];
         self.steps = [0; 2].map(|_| VirtualTimer::at_rest(self.now_us));
     }
 }
@@ -255,11 +281,9 @@ impl Hardware for SimulatedArm {
         self.steps[axis.index()].halt();
     }
 
-    fn encoder_counts(&mut self, axis: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
+    fn encoder_word(&mut self, axis: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         let now_us = self.now_us;
-        self.axes[axis.index()]
-            .encoder_counts(now_us)
-            .ok_or(EncoderLost)
+        self.axes[axis.index()].encoder_word(now_us)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {
@@ -270,6 +294,43 @@ impl Hardware for SimulatedArm {
     fn alarm_closed(&mut self, axis: Axis) -> bool {
         // Closed while all is well.
         self.now_us >= self.alarm_until_us[axis.index()]
+    }
+
+    fn has_driver_bus(&self, _: DriverBus) -> bool {
+        true
+    }
+
+    fn ask_driver(
+        &mut self,
+        axis: Axis,
+        bus: DriverBus,
+        request: DriverBytes,
+        answer_len: usize,
+    ) -> bool {
+        if self.answers.iter().any(Option::is_some) {
+            return false;
+        }
+        let driver = self.drivers[axis.index()].as_mut();
+        let (bytes, took_us) = match bus {
+            DriverBus::OneWire => {
+                let answer = driver.and_then(|driver| driver.one_wire(&request));
+                (answer.unwrap_or_default(), ONE_WIRE_US)
+            }
+            DriverBus::Spi => (by_spi(driver, &request), 0),
+        };
+        let answer = if bytes.len() == answer_len {
+            DriverAnswer::Bytes(bytes)
+        } else {
+            DriverAnswer::Silent
+        };
+        self.answers[axis.index()] = Some((self.now_us + took_us, answer));
+        true
+    }
+
+    fn driver_answer(&mut self, axis: Axis, _: DriverBus) -> DriverAnswer {
+        let now_us = self.now_us;
+        let answer = self.answers[axis.index()].take_if(|(from_us, _)| *from_us <= now_us);
+        answer.map_or(DriverAnswer::Waiting, |(_, answer)| answer)
     }
 
     fn switch_drivers(&mut self, on: bool) {
@@ -307,6 +368,16 @@ impl Hardware for SimulatedArm {
     fn save_settings(&mut self, bytes: &[u8]) -> Result<(), NotSaved> {
         self.store.save(&mut self.flash, bytes)
     }
+}
+
+/// Datagrams one after the other, and what comes back: ones, where there is no chip.
+fn by_spi(mut driver: Option<&mut DriverChip>, request: &[u8]) -> DriverBytes {
+    let (datagrams, _) = request.as_chunks::<{ tmc5160::DATAGRAM_LEN }>();
+    let answers = datagrams.iter().map(|&datagram| match &mut driver {
+        Some(driver) => driver.spi(datagram),
+        None => [0xFF; tmc5160::DATAGRAM_LEN],
+    });
+    answers.flatten().collect()
 }
 
 impl Sectors for RamFlash {

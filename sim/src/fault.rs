@@ -108,6 +108,16 @@ pub enum Fault {
         /// How long, µs.
         for_us: u64,
     },
+    /// The driver, set by wire, loses its supply for a moment, and with it its settings.
+    DriverReset {
+        /// Of which axis.
+        axis: Axis,
+    },
+    /// The encoder's warning bit is set from now on.
+    EncoderWarns {
+        /// Of which axis.
+        axis: Axis,
+    },
     /// Readings of the encoder scatter, by so much (standard deviation).
     EncoderNoise {
         /// Of which axis.

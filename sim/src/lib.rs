@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`plant`] | motor, gear, shaft, encoder and switch of one axis (`no_std`) |
 //! | [`swing`] | how an arm swings on its gear (`no_std`) |
+//! | [`driver_chip`] | a motor's driver that is set by wire (`no_std`) |
 //! | [`arm`] | the arm: two such axes behind the firmware's hardware trait (`no_std`) |
 //! | [`fault`], [`random_faults`] | what may go wrong, as data; random fault plans by a seed |
 //! | [`wire`] | bytes under way between host and controller |
@@ -13,6 +14,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod arm;
+pub mod driver_chip;
 pub mod plant;
 pub mod swing;
 

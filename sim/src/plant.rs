@@ -9,6 +9,7 @@
 
 use core::f64::consts::TAU;
 
+use gonia_firmware::hardware::{EncoderLost, EncoderWord};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -127,6 +128,17 @@ impl PlantConfig {
     }
 }
 
+/// What an encoder says of itself beside its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderSays {
+    /// All is well.
+    Nothing,
+    /// It is near its limits.
+    Warning,
+    /// The position is not valid.
+    Error,
+}
+
 /// One axis in motion.
 #[derive(Debug)]
 pub struct AxisPlant {
@@ -145,6 +157,7 @@ pub struct AxisPlant {
     switch_chatters_until_us: u64,
     stalled_until_us: u64,
     encoder_lost_until_us: u64,
+    encoder_says: EncoderSays,
     encoder_offset_udeg: f64,
     extra_noise_udeg: f64,
     noisy_until_us: u64,
@@ -171,6 +184,7 @@ impl AxisPlant {
             switch_chatters_until_us: 0,
             stalled_until_us: 0,
             encoder_lost_until_us: 0,
+            encoder_says: EncoderSays::Nothing,
             encoder_offset_udeg: 0.0,
             extra_noise_udeg: 0.0,
             noisy_until_us: 0,
@@ -234,6 +248,24 @@ impl AxisPlant {
             + self.encoder_offset_udeg;
         let counts = libm::floor(seen * f64::from(config.encoder_counts) / 360e6 + 0.5);
         Some((counts as i64).rem_euclid(i64::from(config.encoder_counts)) as u32)
+    }
+
+    /// What the encoder says, with its error and warning bits.
+    pub fn encoder_word(&mut self, now_us: u64) -> Result<EncoderWord, EncoderLost> {
+        let counts = self.encoder_counts(now_us).ok_or(EncoderLost::Silent)?;
+        match self.encoder_says {
+            EncoderSays::Nothing => Ok(counts.into()),
+            EncoderSays::Warning => Ok(EncoderWord {
+                counts,
+                warns: true,
+            }),
+            EncoderSays::Error => Err(EncoderLost::Invalid),
+        }
+    }
+
+    /// The encoder's error or warning bit is set from now on, or neither.
+    pub fn let_encoder_say(&mut self, says: EncoderSays) {
+        self.encoder_says = says;
     }
 
     /// Whether the contact of the home switch is closed.

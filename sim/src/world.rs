@@ -12,6 +12,7 @@ use gonia_protocol::{NODE_CAMERA, NODE_LIGHT};
 
 use crate::arm::SimulatedArm;
 use crate::fault::{Arm, Fault, FaultEvent, FaultPlan};
+use crate::plant::EncoderSays;
 use crate::record::{StopRecord, TriggerRecord};
 use crate::wire::Wire;
 
@@ -254,6 +255,17 @@ impl World {
             Fault::SwitchCut { axis } => arm.hardware.axis(axis).cut_switch(),
             Fault::DriverAlarm { axis, for_us } => {
                 arm.hardware.raise_alarm_until(axis, now_us + for_us);
+            }
+            Fault::DriverReset { axis } => {
+                // One that is set by hand has nothing to lose.
+                if let Some(driver) = arm.hardware.driver(axis) {
+                    driver.reset();
+                }
+            }
+            Fault::EncoderWarns { axis } => {
+                arm.hardware
+                    .axis(axis)
+                    .let_encoder_say(EncoderSays::Warning);
             }
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
             Fault::Bumper { deg } => self.bumper_deg = deg,

@@ -13,6 +13,7 @@ use gonia_acquire::capture::{Arms, POINTING_LIMIT_DEG, SessionError, ShotOutcome
 use gonia_acquire::link::{LinkError, RemoteController, calibrate_axis};
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::{Direction, Pose};
+use gonia_firmware::driver::DriverBus;
 use gonia_protocol::NODE_LIGHT;
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::message::{ControllerState, RequestRefusal};
@@ -47,6 +48,8 @@ enum Cause {
     Adjusted(fn(&mut PlantConfig), fn(&SimRig, &mut RemoteController)),
     /// The driver of θ on the light arm reports an alarm, as its setting says.
     Alarm,
+    /// The drivers of the light arm are set by wire, as the setting says, and one loses its supply for a moment.
+    DriverReset,
     /// The power goes while the host saves settings.
     TornSave,
     /// The host falls silent during a move.
@@ -288,6 +291,22 @@ fn rows() -> Vec<Row> {
             host: "nothing to do",
         },
         Row {
+            fault: "driver set by wire (TMC2209) loses its supply for a moment in mid-move",
+            cause: Cause::DriverReset,
+            does: "stops both axes, switches the drivers' current off; cleared, it writes their settings again",
+            codes: &[FaultCode::DRIVER_RESET],
+            end: over_it(),
+            host: HOMES,
+        },
+        event(
+            "encoder's warning bit set for the rest of the session",
+            Fault::EncoderWarns { axis: THETA },
+            "reports and logs it once (code 23), and goes on",
+            &[],
+            nothing(),
+            "notes it in the journal as a warning",
+        ),
+        Row {
             fault: "driver's alarm for 20 s, driver_alarm 1",
             cause: Cause::Alarm,
             does: "stops both axes, engages the brakes, switches the drivers off; `clear` is refused while the alarm is there",
@@ -496,6 +515,13 @@ fn rig_for(cause: &Cause) -> (SimRig, u64) {
             };
             (SimRig::new(5, at(STRIKE_US, alarm)), STRIKE_US)
         }
+        Cause::DriverReset => {
+            let reset = Fault::DriverReset { axis: THETA };
+            let mut light = SimulatedArm::default_arm(21);
+            light.fit_drivers(DriverBus::OneWire);
+            let arms = [light, SimulatedArm::default_arm(22)];
+            (SimRig::with_arms(5, at(STRIKE_US, reset), arms), STRIKE_US)
+        }
         Cause::Bumper => {
             let bumper = Fault::Bumper { deg: KEEP_OUT_DEG };
             (SimRig::new(5, at(STRIKE_US, bumper)), STRIKE_US)
@@ -533,7 +559,7 @@ fn run(row: &Row) -> Seen {
     }
     let first = stops.iter().find(|stop| stop.time_us >= strike_us);
     let safe_s = match row.cause {
-        Cause::Event(_) | Cause::HostGone | Cause::Alarm => {
+        Cause::Event(_) | Cause::HostGone | Cause::Alarm | Cause::DriverReset => {
             first.map(|stop| (stop.time_us - strike_us) as f64 * 1e-6)
         }
         _ => None,
@@ -541,17 +567,33 @@ fn run(row: &Row) -> Seen {
     Seen { codes, end, safe_s }
 }
 
+/// What a person has set on the light arm before the session.
+fn adjust_light(rig: &SimRig, cause: &Cause) {
+    if !matches!(
+        cause,
+        Cause::Alarm | Cause::DriverReset | Cause::Adjusted(..)
+    ) {
+        return;
+    }
+    let mut light = RemoteController::connect(Box::new(rig.port(Arm::Light)), NODE_LIGHT).unwrap();
+    match cause {
+        Cause::Alarm => light.set_setting(THETA, Key::DriverAlarm, 1).unwrap(),
+        Cause::DriverReset => {
+            for axis in Axis::BOTH {
+                light.set_setting(axis, Key::DriverKind, 1).unwrap();
+            }
+        }
+        Cause::Adjusted(_, adjust) => {
+            adjust(rig, &mut light);
+            light.rest(1_000).unwrap();
+        }
+        _ => {}
+    }
+}
+
 fn session(rig: &SimRig, cause: &Cause) -> End {
     let port = |arm| Box::new(rig.port(arm));
-    if matches!(cause, Cause::Alarm) {
-        let mut light = RemoteController::connect(port(Arm::Light), NODE_LIGHT).unwrap();
-        light.set_setting(THETA, Key::DriverAlarm, 1).unwrap();
-    }
-    if let Cause::Adjusted(_, adjust) = cause {
-        let mut light = RemoteController::connect(port(Arm::Light), NODE_LIGHT).unwrap();
-        adjust(rig, &mut light);
-        light.rest(1_000).unwrap();
-    }
+    adjust_light(rig, cause);
     let mut arms = Arms::connect(port(Arm::Light), port(Arm::Camera)).unwrap();
     let is_calibrated = arms.uncalibrated().unwrap().len() < 4;
     assert_eq!(is_calibrated, row_calibrates(cause));
@@ -588,6 +630,10 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
         }
         Ok(())
     });
+    // A warning is heard by the host; nothing else is one.
+    let warns = matches!(cause, Cause::Event(Fault::EncoderWarns { .. }));
+    let remarks = arms.take_remarks();
+    assert_eq!(remarks.len(), usize::from(warns), "{remarks:?}");
     match result {
         Ok(summary) if summary.refused > 0 => End::Refused,
         Ok(summary) => {

@@ -8,7 +8,10 @@ use std::sync::{Arc, Mutex};
 
 use gonia_acquire::link::{RemoteController, Transport};
 use gonia_firmware::controller::ArmController;
-use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::driver::DriverBus;
+use gonia_firmware::hardware::{
+    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+};
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::settings::ControllerSettings;
 use gonia_firmware::steps::{Period, StepProgress};
@@ -42,8 +45,17 @@ impl Hardware for Board {
         StepProgress::default()
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
-        Ok(1000)
+    fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
+        Ok(1000.into())
+    }
+    fn has_driver_bus(&self, _: DriverBus) -> bool {
+        false
+    }
+    fn ask_driver(&mut self, _: Axis, _: DriverBus, _: DriverBytes, _: usize) -> bool {
+        false
+    }
+    fn driver_answer(&mut self, _: Axis, _: DriverBus) -> DriverAnswer {
+        DriverAnswer::Waiting
     }
     fn home_switch_closed(&mut self, _: Axis) -> bool {
         false

@@ -102,6 +102,14 @@ const ROLES: &[(&str, &str)] = &[
     ),
     ("φ driver's alarm", "the same of φ's driver"),
     (
+        "θ driver's UART or select",
+        "PDN_UART of a TMC2209 through 1 kΩ, or CSN of a TMC5160, where `driver_kind` says so",
+    ),
+    ("φ driver's UART or select", "the same of φ's driver"),
+    ("drivers' clock", "SCK of both TMC5160"),
+    ("drivers' data in", "SDI of both TMC5160"),
+    ("drivers' data out", "SDO of both TMC5160"),
+    (
         "brakes",
         "high lets them go: the coils of both, through a transistor; without power they are engaged",
     ),

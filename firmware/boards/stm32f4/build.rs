@@ -57,6 +57,7 @@ fn compare_with_chip() -> Result<(), Box<dyn Error>> {
             }
             Signal::SpiClock(spi) => (format!("SPI{spi}"), "SCK".into()),
             Signal::SpiData(spi) => (format!("SPI{spi}"), "MISO".into()),
+            Signal::SpiOut(spi) => (format!("SPI{spi}"), "MOSI".into()),
             Signal::UartTx(uart) => (format!("USART{uart}"), "TX".into()),
             Signal::UartRx(uart) => (format!("USART{uart}"), "RX".into()),
         };

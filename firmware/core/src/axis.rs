@@ -5,7 +5,7 @@ use gonia_protocol::message::AxisStatus;
 use gonia_protocol::settings::{Axis, Key};
 
 use crate::error_map::{ErrorMap, GearMap};
-use crate::hardware::Hardware;
+use crate::hardware::{EncoderLost, Hardware};
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
 use crate::settings::ControllerSettings;
 use crate::steps::{DEPTH, End, Period};
@@ -19,6 +19,11 @@ const AHEAD_MIN: usize = 2;
 const MAX_BAD_READINGS: u8 = 3;
 /// Movement between two readings that is always plausible: noise, a knock, ringing.
 const ALWAYS_PLAUSIBLE_UDEG: i64 = 200_000;
+
+/// Readings in a row with the encoder's warning bit that make a warning; fewer may be interference.
+const WARNING_READINGS: u8 = 3;
+/// A warning is not given again before the encoder has said nothing of it for so long, µs.
+const WARNING_GAP_US: u64 = 10_000_000;
 
 /// Steps and encoder of one axis.
 #[derive(Debug)]
@@ -64,6 +69,12 @@ struct Encoder {
     udeg: i32,
     read_us: u64,
     bad_readings: u8,
+    /// Readings in a row with its warning bit.
+    warnings: u8,
+    /// A warning was given, and stands until then, µs.
+    warned_until_us: u64,
+    /// A warning is to be given.
+    has_warning: bool,
 }
 
 /// A reading of the encoder.
@@ -265,8 +276,9 @@ impl AxisDrive {
     ) -> Result<EncoderReading, FaultCode> {
         let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
         let encoder = &mut self.encoder;
-        let reading = hardware.encoder_counts(self.axis, settings.encoder(self.axis));
-        let reading = match reading {
+        let word = hardware.encoder_word(self.axis, settings.encoder(self.axis));
+        encoder.note_warning(now_us, word.is_ok_and(|word| word.warns));
+        let reading = match word.map(|word| word.counts) {
             // Count 0 stays where it is.
             Ok(raw) if encoder.is_reversed && raw > 0 && i64::from(raw) < turn => {
                 Ok(turn as u32 - raw)
@@ -293,6 +305,7 @@ impl AxisDrive {
                     (None, FaultCode::ENCODER_JUMP)
                 }
             }
+            Err(EncoderLost::Invalid) => (None, FaultCode::ENCODER_INVALID),
             _ => (None, FaultCode::ENCODER_LOST),
         };
         if let Some(counts) = counts {
@@ -307,6 +320,16 @@ impl AxisDrive {
         } else {
             Ok(EncoderReading::Stale)
         }
+    }
+
+    /// Whether the encoder has begun to warn since the last call.
+    pub fn take_warning(&mut self) -> bool {
+        core::mem::take(&mut self.encoder.has_warning)
+    }
+
+    /// Steps given since the start, up minus down.
+    pub fn steps(&self) -> i64 {
+        self.steps
     }
 
     /// Whether the axis can travel so far that a cam on it closes the home switch at several turns.
@@ -401,6 +424,18 @@ impl AxisDrive {
 }
 
 impl Encoder {
+    fn note_warning(&mut self, now_us: u64, warns: bool) {
+        if !warns {
+            self.warnings = 0;
+            return;
+        }
+        self.warnings = self.warnings.saturating_add(1);
+        if self.warnings >= WARNING_READINGS {
+            self.has_warning |= now_us >= self.warned_until_us;
+            self.warned_until_us = now_us + WARNING_GAP_US;
+        }
+    }
+
     fn set_counts(&mut self, counts: i64, turn: i64) {
         self.counts = counts;
         let place = |counts: i64| (((counts.rem_euclid(turn)) << 32) / turn) as u32;

@@ -7,7 +7,7 @@
 //! clock's rising edge and are read at the falling one, which is the SPI's mode of SSI (`ssi`). 328 kHz is far
 //! below what these rings follow, and no clock stays away as long as their timeout of some 12 µs.
 
-use crate::hardware::EncoderLost;
+use crate::hardware::{EncoderLost, EncoderWord};
 
 /// Bits of the CRC.
 const CRC_BITS: u32 = 6;
@@ -24,9 +24,8 @@ pub(crate) fn bytes(bits: u32) -> usize {
     (LEAD_BITS + AROUND_BITS + bits + CRC_BITS).div_ceil(8) as usize
 }
 
-/// The position in a word of so many bytes, first bit highest. The warning says that the ring is near its
-/// limits (dirt, distance, temperature); its position holds.
-pub(crate) fn decode(word: u64, bits: u32, bytes: usize) -> Result<u32, EncoderLost> {
+/// A word of so many bytes, first bit highest.
+pub(crate) fn decode(word: u64, bits: u32, bytes: usize) -> Result<EncoderWord, EncoderLost> {
     let rest = word.leading_ones();
     // Beyond the bytes that were read there are zeros: a word that has not started has no one.
     let acknowledged = word.checked_shl(rest).unwrap_or(0);
@@ -34,17 +33,22 @@ pub(crate) fn decode(word: u64, bits: u32, bytes: usize) -> Result<u32, EncoderL
     let needed = AROUND_BITS + bits + CRC_BITS;
     // A ring that still holds the line low after its last word is not ready.
     if rest == 0 || acknowledged == 0 || lead + needed > 8 * bytes as u32 {
-        return Err(EncoderLost);
+        return Err(EncoderLost::Silent);
     }
     let word = word << lead;
     let control = word >> 62 & 1;
     let checked = word << 2 >> (64 - bits - 2);
     let crc = word << (4 + bits) >> (64 - CRC_BITS);
-    let is_valid = checked >> 1 & 1;
-    if control != 0 || is_valid == 0 || crc != inverted_crc(checked, bits + 2) {
-        return Err(EncoderLost);
+    if control != 0 || crc != inverted_crc(checked, bits + 2) {
+        return Err(EncoderLost::Silent);
     }
-    Ok((checked >> 2) as u32)
+    if checked >> 1 & 1 == 0 {
+        return Err(EncoderLost::Invalid);
+    }
+    Ok(EncoderWord {
+        counts: (checked >> 2) as u32,
+        warns: checked & 1 == 0,
+    })
 }
 
 /// The CRC of so many bits, as it is sent.
@@ -77,7 +81,9 @@ pub(crate) fn encode(counts: u32, bits: u32, is_valid: bool, warns: bool, lead: 
 mod tests {
     use super::*;
 
-    fn read(word: u64, bits: u32) -> Result<u32, EncoderLost> {
+    const LOST: Result<EncoderWord, EncoderLost> = Err(EncoderLost::Silent);
+
+    fn read(word: u64, bits: u32) -> Result<EncoderWord, EncoderLost> {
         let used = bytes(bits);
         decode(word & u64::MAX << (64 - 8 * used), bits, used)
     }
@@ -97,7 +103,7 @@ mod tests {
             for counts in [0, 1, 0x15_5555 & ((1 << bits) - 1), (1 << bits) - 1] {
                 for lead in [(1, 1), (2, 1), (1, 8), (3, 13)] {
                     let word = encode(counts, bits, true, false, lead);
-                    assert_eq!(read(word, bits), Ok(counts), "{bits} bits, {lead:?}");
+                    assert_eq!(read(word, bits), Ok(counts.into()), "{bits} bits, {lead:?}");
                 }
             }
         }
@@ -112,10 +118,10 @@ mod tests {
             let checked = first..first + bits + 2 + CRC_BITS;
             for i in checked.clone() {
                 let bent = word ^ 1 << (63 - i);
-                assert_eq!(read(bent, bits), Err(EncoderLost), "bit {i}");
+                assert_eq!(read(bent, bits), LOST, "bit {i}");
                 for j in i + 1..checked.end {
                     let bent = bent ^ 1 << (63 - j);
-                    assert_eq!(read(bent, bits), Err(EncoderLost), "bits {i}, {j}");
+                    assert_eq!(read(bent, bits), LOST, "bits {i}, {j}");
                 }
             }
         }
@@ -126,18 +132,22 @@ mod tests {
         let busy = encode(77, 18, true, false, (2, 1)) << 2;
         let mute = [u64::MAX, 0, 1 << 63, u64::MAX << 40, u64::MAX >> 40, busy];
         for word in mute {
-            assert_eq!(read(word, 18), Err(EncoderLost), "{word:#x}");
+            assert_eq!(read(word, 18), LOST, "{word:#x}");
         }
         let error = encode(77, 18, false, false, (2, 1));
-        assert_eq!(read(error, 18), Err(EncoderLost));
+        assert_eq!(read(error, 18), Err(EncoderLost::Invalid));
         // A word that starts so late that its end is not read.
         let late = encode(77, 18, true, false, (2, 21));
-        assert_eq!(read(late, 18), Err(EncoderLost));
+        assert_eq!(read(late, 18), LOST);
     }
 
     #[test]
-    fn a_warning_leaves_the_position_as_it_is() {
+    fn a_warning_is_told_and_leaves_the_position_as_it_is() {
         let word = encode(77, 18, true, true, (2, 1));
-        assert_eq!(read(word, 18), Ok(77));
+        let expected = EncoderWord {
+            counts: 77,
+            warns: true,
+        };
+        assert_eq!(read(word, 18), Ok(expected));
     }
 }

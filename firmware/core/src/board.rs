@@ -95,7 +95,10 @@ mod tests {
 
     use super::*;
     use crate::controller::ArmController;
-    use crate::hardware::{EncoderLost, EncoderSetup, NotSaved};
+    use crate::driver::DriverBus;
+    use crate::hardware::{
+        DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, NotSaved,
+    };
     use crate::node::identity;
     use crate::steps::{Period, StepProgress};
 
@@ -108,8 +111,17 @@ mod tests {
             StepProgress::default()
         }
         fn halt(&mut self, _: Axis) {}
-        fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
-            Ok(1000)
+        fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
+            Ok(1000.into())
+        }
+        fn has_driver_bus(&self, _: DriverBus) -> bool {
+            false
+        }
+        fn ask_driver(&mut self, _: Axis, _: DriverBus, _: DriverBytes, _: usize) -> bool {
+            false
+        }
+        fn driver_answer(&mut self, _: Axis, _: DriverBus) -> DriverAnswer {
+            DriverAnswer::Waiting
         }
         fn home_switch_closed(&mut self, _: Axis) -> bool {
             false

@@ -1,12 +1,60 @@
 //! What a board must offer.
 
 use gonia_protocol::settings::Axis;
+use heapless::Vec;
 
 use crate::steps::{Period, StepProgress};
 
-/// The encoder did not answer, or its answer failed its own check.
+/// Why there is no position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EncoderLost;
+pub enum EncoderLost {
+    /// The encoder did not answer, or its answer failed its own check.
+    Silent,
+    /// It answered that its position is not valid: its error bit.
+    Invalid,
+}
+
+/// What an encoder says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderWord {
+    /// Its position, counts of a turn.
+    pub counts: u32,
+    /// Its warning bit: it is near its limits (dirt, distance, temperature), and the position holds.
+    pub warns: bool,
+}
+
+impl From<u32> for EncoderWord {
+    /// A position without a warning.
+    fn from(counts: u32) -> Self {
+        Self {
+            counts,
+            warns: false,
+        }
+    }
+}
+
+/// Which wire leads to a motor's driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriverBus {
+    /// A TMC2209's: one wire for both directions, open drain, 8N1 by [`crate::single_wire`].
+    OneWire,
+    /// A TMC5160's: SPI mode 3, a select line for each driver.
+    Spi,
+}
+
+/// Bytes to or from a motor's driver: two datagrams of a TMC5160 at most.
+pub type DriverBytes = Vec<u8, 10>;
+
+/// What has come of an exchange with a motor's driver.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DriverAnswer {
+    /// It is under way.
+    Waiting,
+    /// As many bytes as were awaited.
+    Bytes(DriverBytes),
+    /// Fewer, or none.
+    Silent,
+}
 
 /// What an encoder speaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,14 +90,31 @@ pub trait Hardware {
     /// No step of this axis after this; whatever waits is dropped.
     fn halt(&mut self, axis: Axis);
 
-    /// The absolute encoder of the shaft, in counts of one turn.
-    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost>;
+    /// The absolute encoder of the shaft.
+    fn encoder_word(&mut self, axis: Axis, setup: EncoderSetup)
+    -> Result<EncoderWord, EncoderLost>;
 
     /// Whether the contact of the home switch is closed: above home, where it is normally closed.
     fn home_switch_closed(&mut self, axis: Axis) -> bool;
 
     /// Whether the contact of the alarm output of an axis's driver is closed.
     fn alarm_closed(&mut self, axis: Axis) -> bool;
+
+    /// Whether a wire of this kind leads to the drivers of both axes.
+    fn has_driver_bus(&self, bus: DriverBus) -> bool;
+
+    /// Sends bytes to the driver of an axis, after which so many come back. `false` where the wire is in use for
+    /// the other axis: nothing was sent.
+    fn ask_driver(
+        &mut self,
+        axis: Axis,
+        bus: DriverBus,
+        request: DriverBytes,
+        answer_len: usize,
+    ) -> bool;
+
+    /// What has come of it. An answer is returned once.
+    fn driver_answer(&mut self, axis: Axis, bus: DriverBus) -> DriverAnswer;
 
     /// Gives the motors' drivers their current, or takes it away.
     fn switch_drivers(&mut self, on: bool);

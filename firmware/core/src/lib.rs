@@ -10,6 +10,7 @@
 //! | [`axis`] | one axis: steps, encoder, segments of a move |
 //! | [`profile`], [`steps`] | when the next step is due; from the main loop to the timer that gives it |
 //! | [`homing`], [`settling`], [`train`] | how one axis finds home; how one axis comes to rest; trigger pulses |
+//! | [`driver`], [`single_wire`] | motors' drivers that are set by wire, and watched; a UART on one plain pin |
 //! | [`power`] | motors' current and brakes: which goes first |
 //! | [`error_map`] | what the encoder reads wrong over a turn, and its removal |
 //! | [`settings`], [`store`] | values of the settings; two sectors of flash that keep them |
@@ -24,6 +25,7 @@ pub mod biss;
 pub mod board;
 pub mod clock;
 pub mod controller;
+pub mod driver;
 pub mod error_map;
 pub mod hardware;
 pub mod homing;
@@ -32,6 +34,7 @@ pub mod power;
 pub mod profile;
 pub mod settings;
 pub mod settling;
+pub mod single_wire;
 pub mod spi_encoder;
 pub mod ssi;
 pub mod steps;

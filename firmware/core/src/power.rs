@@ -54,6 +54,15 @@ impl Power {
         }
     }
 
+    /// What keeps drivers and brakes as they are.
+    pub fn as_it_is(&self) -> PowerDemand {
+        match (self.has_current, self.is_released) {
+            (false, _) => PowerDemand::Off,
+            (true, false) => PowerDemand::Brake,
+            (true, true) => PowerDemand::Run,
+        }
+    }
+
     /// Whether the motors hold the arm and may turn it.
     pub fn is_ready(&self, now_us: u64) -> bool {
         self.is_released && now_us >= self.settled_us

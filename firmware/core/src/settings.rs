@@ -7,6 +7,7 @@
 use gonia_protocol::crc32c;
 use gonia_protocol::settings::{Axis, Key, MEANINGS, N_SETTINGS};
 
+use crate::driver::{DriverBus, DriverSetup, currents};
 use crate::hardware::{EncoderKind, EncoderSetup};
 
 const FORMAT: u8 = 1;
@@ -60,6 +61,24 @@ impl ControllerSettings {
             },
             turn: self.get_u64(axis, Key::EncoderCountsPerTurn) as u32,
         }
+    }
+
+    /// How the driver of an axis is set by wire; `None` where it is set by hand.
+    pub fn driver(&self, axis: Axis) -> Option<DriverSetup> {
+        let get = |key| self.get_u64(axis, key) as u32;
+        let bus = match get(Key::DriverKind) {
+            1 => DriverBus::OneWire,
+            2 => DriverBus::Spi,
+            _ => return None,
+        };
+        Some(DriverSetup {
+            bus,
+            address: get(Key::DriverAddress) as u8,
+            run_ma: get(Key::RunCurrent),
+            hold_ma: get(Key::HoldCurrent),
+            microsteps: get(Key::Microsteps),
+            sense_mohm: get(Key::SenseResistor),
+        })
     }
 
     /// Changes a value, or nothing. A setting of the node changes for both axes.
@@ -134,7 +153,12 @@ impl ControllerSettings {
                 && get(Key::HomeSlowSpeed) <= get(Key::HomeFastSpeed)
                 && get(Key::HomeFastSpeed) <= get(Key::MaxSpeed)
                 && get(Key::InPositionWindow) <= get(Key::TriggerWindow)
-                && get(Key::TriggerWindow) <= get(Key::FollowingLimit);
+                && get(Key::TriggerWindow) <= get(Key::FollowingLimit)
+                && self.get_u64(axis, Key::Microsteps).is_power_of_two()
+                && get(Key::HoldCurrent) <= get(Key::RunCurrent)
+                && self
+                    .driver(axis)
+                    .is_none_or(|driver| currents(&driver).is_some());
             if !in_range || !consistent {
                 return Err(BadValue);
             }
@@ -211,6 +235,20 @@ mod tests {
             assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue));
         }
         assert_eq!(settings, ControllerSettings::default());
+        // What a potentiometer sets may be anything; by wire, 2 A are more than 110 mΩ give.
+        let set =
+            |settings: &mut ControllerSettings, key, value| settings.set(Axis::Theta, key, value);
+        set(&mut settings, Key::RunCurrent, 2_000).unwrap();
+        assert_eq!(set(&mut settings, Key::DriverKind, 1), Err(BadValue));
+        set(&mut settings, Key::SenseResistor, 75).unwrap();
+        set(&mut settings, Key::DriverKind, 1).unwrap();
+        for (key, value) in [
+            (Key::Microsteps, 12),
+            (Key::HoldCurrent, 2_001),
+            (Key::SenseResistor, 110),
+        ] {
+            assert_eq!(set(&mut settings, key, value), Err(BadValue));
+        }
         settings
             .set(Axis::Theta, Key::StepsPerTurn, 1_200_000)
             .unwrap();

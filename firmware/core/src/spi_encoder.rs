@@ -3,7 +3,7 @@
 
 use embedded_hal::spi::SpiBus;
 
-use crate::hardware::{EncoderKind, EncoderLost, EncoderSetup};
+use crate::hardware::{EncoderKind, EncoderLost, EncoderSetup, EncoderWord};
 use crate::{biss, ssi};
 
 /// Bits of the finest ring.
@@ -15,7 +15,7 @@ const PAUSE_US: u64 = 50;
 #[derive(Debug)]
 pub struct SpiEncoder<S> {
     spi: S,
-    last: Result<u32, EncoderLost>,
+    last: Result<EncoderWord, EncoderLost>,
     read_us: Option<u64>,
 }
 
@@ -24,14 +24,14 @@ impl<S: SpiBus> SpiEncoder<S> {
     pub const fn new(spi: S) -> Self {
         Self {
             spi,
-            last: Err(EncoderLost),
+            last: Err(EncoderLost::Silent),
             read_us: None,
         }
     }
 
     /// The position in counts, of which `setup.turn` are a turn: a power of two, at most 2²⁶. Within the
     /// encoder's pause the last one, which is not older than it.
-    pub fn counts(&mut self, now_us: u64, setup: EncoderSetup) -> Result<u32, EncoderLost> {
+    pub fn word(&mut self, now_us: u64, setup: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         if self.read_us.is_none_or(|at| now_us >= at + PAUSE_US) {
             self.last = self.read(setup);
             self.read_us = Some(now_us);
@@ -39,15 +39,17 @@ impl<S: SpiBus> SpiEncoder<S> {
         self.last
     }
 
-    fn read(&mut self, setup: EncoderSetup) -> Result<u32, EncoderLost> {
+    fn read(&mut self, setup: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         let bits = setup.turn.max(2).ilog2().min(MOST_BITS);
         let used = match setup.kind {
             EncoderKind::Ssi => ssi::bytes(bits),
             EncoderKind::BissC => biss::bytes(bits),
         };
         let mut word = [0u8; 8];
-        let read = self.spi.read(word.get_mut(..used).ok_or(EncoderLost)?);
-        read.map_err(|_| EncoderLost)?;
+        let read = self
+            .spi
+            .read(word.get_mut(..used).ok_or(EncoderLost::Silent)?);
+        read.map_err(|_| EncoderLost::Silent)?;
         let word = u64::from_be_bytes(word);
         match setup.kind {
             EncoderKind::Ssi => ssi::decode(word, bits, used),
@@ -96,6 +98,10 @@ mod tests {
         SpiEncoder::new(Line(words))
     }
 
+    fn ok(counts: u32) -> Result<EncoderWord, EncoderLost> {
+        Ok(counts.into())
+    }
+
     fn ring(kind: EncoderKind, bits: u32) -> EncoderSetup {
         EncoderSetup {
             kind,
@@ -105,7 +111,7 @@ mod tests {
 
     /// What a ring of SSI puts on the line, first bit highest.
     fn ssi_word(counts: u64, bits: u32) -> u64 {
-        1 << 63 | counts << (63 - bits) | 1 << (62 - bits)
+        1 << 63 | counts << (63 - bits) | 0b11 << (61 - bits)
     }
 
     #[test]
@@ -121,12 +127,24 @@ mod tests {
         ];
         let mut encoder = encoder(&words);
         let readings =
-            [0, 1, 2, 3, 4, 5].map(|i| encoder.counts(i * 1000, ring(EncoderKind::Ssi, 18)));
-        let lost = Err(EncoderLost);
+            [0, 1, 2, 3, 4, 5].map(|i| encoder.word(i * 1000, ring(EncoderKind::Ssi, 18)));
+        let lost = Err(EncoderLost::Silent);
+        let invalid = Err(EncoderLost::Invalid);
         assert_eq!(
             readings,
-            [Ok(0), Ok(0x2_5A5A), Ok(0x3_FFFF), lost, lost, lost]
+            [ok(0), ok(0x2_5A5A), ok(0x3_FFFF), invalid, lost, lost]
         );
+    }
+
+    #[test]
+    fn a_warning_is_told_and_leaves_the_position_as_it_is() {
+        let words = [ssi_word(77, 18) & !(1 << 43)];
+        let expected = EncoderWord {
+            counts: 77,
+            warns: true,
+        };
+        let word = encoder(&words).word(0, ring(EncoderKind::Ssi, 18));
+        assert_eq!(word, Ok(expected));
     }
 
     #[test]
@@ -134,8 +152,8 @@ mod tests {
         let words = [ssi_word(5, 18), ssi_word(6, 18)];
         let mut encoder = encoder(&words);
         assert_eq!(
-            [100, 149, 150].map(|at| encoder.counts(at, ring(EncoderKind::Ssi, 18))),
-            [Ok(5), Ok(5), Ok(6)]
+            [100, 149, 150].map(|at| encoder.word(at, ring(EncoderKind::Ssi, 18))),
+            [ok(5), ok(5), ok(6)]
         );
     }
 
@@ -147,8 +165,8 @@ mod tests {
             let words = [word(1), word(highest), word(highest) & !(1 << (62 - bits))];
             let mut encoder = encoder(&words);
             assert_eq!(
-                [0, 1000, 2000].map(|at| encoder.counts(at, ring(EncoderKind::Ssi, bits))),
-                [Ok(1), Ok(highest as u32), Err(EncoderLost)],
+                [0, 1000, 2000].map(|at| encoder.word(at, ring(EncoderKind::Ssi, bits))),
+                [ok(1), ok(highest as u32), Err(EncoderLost::Invalid)],
                 "{bits} bits"
             );
         }
@@ -159,14 +177,8 @@ mod tests {
         let word = biss::encode(0x2_5A5A, 18, true, false, (2, 3));
         let words = [word, word];
         let mut encoder = encoder(&words);
-        assert_eq!(
-            encoder.counts(0, ring(EncoderKind::BissC, 18)),
-            Ok(0x2_5A5A)
-        );
+        assert_eq!(encoder.word(0, ring(EncoderKind::BissC, 18)), ok(0x2_5A5A));
         // The acknowledgement stands where SSI has its first bits.
-        assert_ne!(
-            encoder.counts(1000, ring(EncoderKind::Ssi, 18)),
-            Ok(0x2_5A5A)
-        );
+        assert_ne!(encoder.word(1000, ring(EncoderKind::Ssi, 18)), ok(0x2_5A5A));
     }
 }

@@ -19,6 +19,7 @@ use rigless::time::VirtualNanos;
 
 use crate::chips::{Shared, lock};
 use crate::nvic;
+use crate::one_wire::OneWire;
 use crate::part::Bench;
 
 /// What the script asks of the chip's side while the clock stands.
@@ -70,6 +71,8 @@ struct Outputs {
     relay: Output,
     brakes: Option<Output>,
     trigger: Output,
+    /// The drivers' lines, which are on while they are high.
+    driver_lines: Vec<Output>,
 }
 
 impl Outputs {
@@ -111,6 +114,12 @@ impl Outputs {
             enables: enables.collect(),
             relay: of_tim8(board.relay),
             brakes: board.brakes.map(of_tim8),
+            driver_lines: board
+                .drivers
+                .iter()
+                .flat_map(|drivers| drivers.lines)
+                .map(|line| high(line.pin, Source::Plain))
+                .collect(),
             trigger: high(out.wire.pin, timer(out.wire.pin, CLOCK_TIMER, out.channel)),
         }
     }
@@ -161,6 +170,8 @@ pub struct Wiring {
     board: &'static Board,
     outputs: Outputs,
     state: State,
+    /// The script's next instant, which one of the wires may come before.
+    until_ns: u64,
 }
 
 /// Levels as they were last seen or driven.
@@ -192,6 +203,7 @@ impl Wiring {
             board,
             outputs: Outputs::of(board),
             state: State::default(),
+            until_ns: 0,
         }
     }
 
@@ -234,6 +246,18 @@ impl Wiring {
         if trigger != self.state.trigger {
             world.trigger.push((at.0, trigger));
             self.state.trigger = trigger;
+        }
+        for (axis, line) in world.axes.iter_mut().zip(&outputs.driver_lines) {
+            let is_high = is_on(chip, *line);
+            axis.select(!is_high);
+            let Some(wire) = &mut axis.driver else {
+                continue;
+            };
+            wire.see(is_high, at.0);
+            let (pulled, pulls) = (wire.pulls(), wire.poll(at.0));
+            if pulls != pulled {
+                drive(chip, at, line.pin, pulls.then_some(Level::Low));
+            }
         }
         world.relay.energise(is_on(chip, outputs.relay), at.0);
         let now_us = at.0 / 1000;
@@ -362,13 +386,26 @@ impl Driver<Bench> for Wiring {
         stop: Stop,
         host: &mut dyn Host,
     ) -> Option<VirtualNanos> {
+        let due = |world: &Shared| {
+            let world = lock(world);
+            let wires = world.axes.iter().filter_map(|axis| axis.driver.as_ref());
+            wires.filter_map(OneWire::due_ns).min().unwrap_or(u64::MAX)
+        };
+        if stop.at.0 < self.until_ns {
+            let next_ns = self.until_ns.min(due(&self.world));
+            return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
+        }
         let mut answer = 0;
         loop {
             // The script has gone: so does the run.
             self.done.send(answer).ok()?;
             answer = 0;
             match self.commands.recv().ok()? {
-                Command::Run(until) => return Some(VirtualNanos(until.max(stop.at.0 + 1))),
+                Command::Run(until) => {
+                    self.until_ns = until;
+                    let next_ns = until.min(due(&self.world));
+                    return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
+                }
                 Command::HoldCore(held) => {
                     self.state.core_is_held = held;
                     host.hold(held);

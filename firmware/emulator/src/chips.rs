@@ -34,6 +34,21 @@ impl spi::Peer for Ring {
     }
 }
 
+/// The drivers on their SPI: the one whose select line is low hears and answers.
+#[derive(Debug)]
+pub struct DriverBusSpi {
+    /// Where they are.
+    pub world: Shared,
+}
+
+impl Store for DriverBusSpi {}
+
+impl spi::Peer for DriverBusSpi {
+    fn transfer(&mut self, out: u32, _: u8, _: &mut Timeline<'_, '_>) -> u32 {
+        lock(&self.world).to_drivers(out as u8).into()
+    }
+}
+
 /// The host, at the other end of the UART.
 #[derive(Debug)]
 pub struct HostWire {

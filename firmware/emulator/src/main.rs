@@ -4,6 +4,7 @@
 mod bench;
 mod chips;
 mod nvic;
+mod one_wire;
 mod part;
 mod reference;
 mod rig;
@@ -30,7 +31,12 @@ fn main() -> ExitCode {
     let is_first = rig::board_of(&elf).is_ok_and(|board| board.name == NUCLEO_F446RE.name);
     let wanted = arguments.next().and_then(|word| word.into_string().ok());
     let rows = rows::ROWS.iter().filter(|row| match wanted.as_deref() {
-        None => row.when == When::EveryBoard || (row.when == When::OneBoard && is_first),
+        None => match row.when {
+            When::EveryBoard => true,
+            When::OneBoard => is_first,
+            When::OtherBoards => !is_first,
+            When::Asked => false,
+        },
         Some("--all") => true,
         Some(name) => row.name.contains(name),
     });

@@ -21,7 +21,7 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use crate::bench::{Command, Wiring};
-use crate::chips::{HostWire, Ring, Shared, lock};
+use crate::chips::{DriverBusSpi, HostWire, Ring, Shared, lock};
 use crate::part::Bench;
 use crate::world::World;
 
@@ -121,6 +121,11 @@ impl Rig {
                 let world = wired.clone();
                 let spi = usize::from(pins.encoder.spi) - 1;
                 board.chip.spi[spi].attach(Ring { world, axis });
+            }
+            if let Some(drivers) = of.drivers {
+                let world = wired.clone();
+                let spi = usize::from(drivers.spi.spi) - 1;
+                board.chip.spi[spi].attach(DriverBusSpi { world });
             }
             let wire = HostWire {
                 world: wired.clone(),

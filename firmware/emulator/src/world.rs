@@ -2,7 +2,10 @@
 
 use std::collections::VecDeque;
 
+use gonia_firmware::driver::tmc5160::DATAGRAM_LEN;
 use gonia_sim::plant::{AxisPlant, PlantConfig};
+
+use crate::one_wire::OneWire;
 
 /// How long the relay's contact takes to follow its coil, ns.
 const RELAY_NS: u64 = 8_000_000;
@@ -71,6 +74,14 @@ pub struct Axis {
     pub ring: RingKind,
     /// The encoder's shift register.
     pub ssi: Ssi,
+    /// The driver that is set by wire; `None` for one that is set by hand.
+    pub driver: Option<OneWire>,
+    /// The driver's select line is low, and what it has heard since.
+    heard: Option<Vec<u8>>,
+    /// What the driver puts on the line meanwhile.
+    answer: [u8; DATAGRAM_LEN],
+    /// Datagrams that it has taken.
+    pub datagrams: u32,
 }
 
 /// What a ring speaks.
@@ -121,7 +132,28 @@ impl Axis {
             ssi_hz: 0.0,
             ring: RingKind::Ssi,
             ssi: Ssi::default(),
+            driver: None,
+            heard: None,
+            answer: [0; DATAGRAM_LEN],
+            datagrams: 0,
         }
+    }
+
+    /// The driver's select line falls, or rises: then it takes what it has heard, if that is a datagram.
+    pub fn select(&mut self, is_low: bool) {
+        if is_low == self.heard.is_some() {
+            return;
+        }
+        let heard = std::mem::replace(&mut self.heard, is_low.then(Vec::new));
+        let Some(OneWire { chip, .. }) = &mut self.driver else {
+            return;
+        };
+        let datagram = heard.and_then(|bytes| <[u8; DATAGRAM_LEN]>::try_from(bytes).ok());
+        if let Some(datagram) = datagram {
+            chip.spi_take(datagram);
+            self.datagrams += 1;
+        }
+        self.answer = chip.spi_out();
     }
 
     /// The axis is built otherwise; it stands where it stood at first.
@@ -314,6 +346,19 @@ impl World {
                 axis.can_turn = enabled && released;
             }
         }
+    }
+
+    /// A byte on the drivers' SPI, and what comes back: ones where no driver is selected.
+    pub fn to_drivers(&mut self, byte: u8) -> u8 {
+        let mut back = u8::MAX;
+        for axis in &mut self.axes {
+            let (Some(heard), true) = (&mut axis.heard, axis.driver.is_some()) else {
+                continue;
+            };
+            back &= axis.answer.get(heard.len()).copied().unwrap_or(u8::MAX);
+            heard.push(byte);
+        }
+        back
     }
 
     /// Whether the drivers have their current.

@@ -37,6 +37,8 @@ pub enum Fault {
     HostPorts,
     /// SPIs 1 to 4 read encoders, each one.
     SharedSpi(u8),
+    /// The drivers' SPI is an encoder's.
+    DriversSpi(u8),
     /// Relay and brakes on one channel of TIM8, which has one count for both.
     SharedChannel(u8),
     /// The name is empty, too long, or has other characters than small letters, digits and hyphens.
@@ -90,6 +92,10 @@ impl fmt::Display for Fault {
                     "both encoders are on SPI{spi}; give each an SPI of its own"
                 )
             }
+            Self::DriversSpi(spi) => write!(
+                f,
+                "the drivers are on SPI{spi}, which reads an encoder; give them an SPI of their own"
+            ),
             Self::SharedChannel(channel) => write!(
                 f,
                 "relay and brakes are on channel {channel} of TIM8; give each a channel of its own"
@@ -168,6 +174,12 @@ fn check_pins(board: &Board, report: &mut impl FnMut(Fault)) {
     let [theta, phi] = board.axes.map(|axis| axis.encoder.spi);
     if theta == phi {
         report(Fault::SharedSpi(theta));
+    }
+    let of_drivers = board.drivers.map(|drivers| drivers.spi.spi);
+    for encoder in [theta, phi] {
+        if of_drivers == Some(encoder) {
+            report(Fault::DriversSpi(encoder));
+        }
     }
 }
 
@@ -305,6 +317,9 @@ mod tests {
         board.camera_jumper.pin = Pin::new('J', 1);
         board.trigger_in.channel = 1;
         board.axes[1].encoder.spi = 1;
+        if let Some(drivers) = &mut board.drivers {
+            drivers.spi.spi = 1;
+        }
         board.host_rx.pin = Pin::new('D', 6);
         if let Some(brakes) = &mut board.brakes {
             brakes.channel = board.relay.channel;
@@ -315,6 +330,7 @@ mod tests {
             Fault::NoPin(Pin::new('J', 1), "camera arm"),
             Fault::Alarm("trigger in"),
             Fault::SharedSpi(1),
+            Fault::DriversSpi(1),
             Fault::SharedChannel(1),
             Fault::HostPorts,
         ] {
@@ -361,7 +377,7 @@ mod tests {
     #[test]
     fn every_output_has_a_resistor_that_holds_it_off() {
         const FREE: Output = Output {
-            wire: wire(Pin::new('C', 10), ""),
+            wire: wire(Pin::new('D', 2), ""),
             on: Level::Low,
         };
         let board = Board {

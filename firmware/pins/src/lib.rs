@@ -150,6 +150,28 @@ pub struct TimerOutput {
     pub is_complementary: bool,
 }
 
+/// The wires by which motors' drivers are set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverWires {
+    /// θ's and φ's: the one wire of a TMC2209, or the select line of a TMC5160.
+    pub lines: [Wire; 2],
+    /// What both TMC5160 share.
+    pub spi: DriverSpi,
+}
+
+/// An SPI to drivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverSpi {
+    /// Which SPI: 1 to 4, and no encoder's.
+    pub spi: u8,
+    /// Clock to the drivers.
+    pub clock: Wire,
+    /// Data to them.
+    pub out: Wire,
+    /// Data from them.
+    pub data: Wire,
+}
+
 /// The clock that the chip's PLL starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crystal {
@@ -187,6 +209,8 @@ pub struct Board {
     pub host_rx: Wire,
     /// θ and φ.
     pub axes: [Axis; 2],
+    /// By which drivers can be set, where they can.
+    pub drivers: Option<DriverWires>,
     /// What gives the drivers their current: one for both, or one each.
     pub enables: &'static [Output],
     /// The chain, to ground while it is closed.
@@ -246,6 +270,10 @@ impl Board {
         for (alarm, names) in self.alarms.iter().flatten().zip(AXIS_ROLES) {
             plain(names.alarm, *alarm, None);
         }
+        let lines = self.drivers.iter().flat_map(|drivers| drivers.lines);
+        for (line, names) in lines.zip(AXIS_ROLES) {
+            plain(names.driver_line, line, None);
+        }
         plain("interlock chain", self.interlock, None);
         plain("camera arm", self.camera_jumper, None);
         self.for_each_signal(&mut each);
@@ -270,6 +298,17 @@ impl Board {
             let Encoder { spi, clock, data } = axis.encoder;
             carried(names.clock, clock, Signal::SpiClock(spi), None);
             carried(names.data, data, Signal::SpiData(spi), None);
+        }
+        if let Some(DriverWires { spi, .. }) = self.drivers {
+            let DriverSpi {
+                spi,
+                clock,
+                out,
+                data,
+            } = spi;
+            carried("drivers' clock", clock, Signal::SpiClock(spi), None);
+            carried("drivers' data in", out, Signal::SpiOut(spi), None);
+            carried("drivers' data out", data, Signal::SpiData(spi), None);
         }
         carried(
             "host: transmit",
@@ -304,6 +343,7 @@ struct AxisRoles {
     data: &'static str,
     home_switch: &'static str,
     alarm: &'static str,
+    driver_line: &'static str,
 }
 
 const AXIS_ROLES: [AxisRoles; 2] = [
@@ -314,6 +354,7 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         data: "θ encoder data",
         home_switch: "θ home switch",
         alarm: "θ driver's alarm",
+        driver_line: "θ driver's UART or select",
     },
     AxisRoles {
         step: "φ step",
@@ -322,5 +363,6 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         data: "φ encoder data",
         home_switch: "φ home switch",
         alarm: "φ driver's alarm",
+        driver_line: "φ driver's UART or select",
     },
 ];

@@ -18,6 +18,8 @@ pub enum Signal {
     SpiClock(u8),
     /// What an SPI reads as master: MISO.
     SpiData(u8),
+    /// What an SPI writes as master: MOSI.
+    SpiOut(u8),
     /// What a UART sends.
     UartTx(u8),
     /// What a UART receives.
@@ -31,6 +33,7 @@ impl fmt::Display for Signal {
             Self::TimerComplement(timer, channel) => write!(f, "TIM{timer}_CH{channel}N"),
             Self::SpiClock(spi) => write!(f, "SPI{spi}_SCK"),
             Self::SpiData(spi) => write!(f, "SPI{spi}_MISO"),
+            Self::SpiOut(spi) => write!(f, "SPI{spi}_MOSI"),
             Self::UartTx(uart) => write!(f, "USART{uart}_TX"),
             Self::UartRx(uart) => write!(f, "USART{uart}_RX"),
         }
@@ -49,7 +52,7 @@ const fn row(signal: Signal, port: char, number: u8, function: u8) -> (Signal, P
 
 /// Signal, pin, alternate function.
 pub const TABLE: &[(Signal, Pin, u8)] = &{
-    use Signal::{SpiClock, SpiData, Timer, TimerComplement, UartRx, UartTx};
+    use Signal::{SpiClock, SpiData, SpiOut, Timer, TimerComplement, UartRx, UartTx};
     [
         row(Timer(2, 1), 'A', 0, 1),
         row(Timer(2, 1), 'A', 5, 1),
@@ -104,6 +107,15 @@ pub const TABLE: &[(Signal, Pin, u8)] = &{
         row(SpiData(4), 'E', 5, 5),
         row(SpiData(4), 'E', 13, 5),
         row(SpiData(4), 'G', 12, 6),
+        row(SpiOut(1), 'A', 7, 5),
+        row(SpiOut(1), 'B', 5, 5),
+        row(SpiOut(2), 'B', 15, 5),
+        row(SpiOut(2), 'C', 1, 7),
+        row(SpiOut(2), 'C', 3, 5),
+        row(SpiOut(3), 'B', 5, 6),
+        row(SpiOut(3), 'C', 12, 6),
+        row(SpiOut(4), 'E', 6, 5),
+        row(SpiOut(4), 'E', 14, 5),
         row(UartTx(2), 'A', 2, 7),
         row(UartTx(2), 'D', 5, 7),
         row(UartRx(2), 'A', 3, 7),

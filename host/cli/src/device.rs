@@ -1,5 +1,6 @@
 //! `gonia device`: the controller of one arm, for a person at the rig.
 
+use crate::remarks;
 use crate::say::{self, outln};
 use crate::table;
 use anyhow::{Context, Result, bail};
@@ -68,7 +69,7 @@ enum Action {
     Estop,
     /// Clear a latched fault or an emergency stop, when its cause is gone
     Clear,
-    /// The last faults, newest first
+    /// The last faults and warnings, newest first
     Log,
     /// Every setting, with its unit
     Settings,
@@ -124,27 +125,35 @@ impl Device {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         let mut arm = connect(&self.port, self.baud)?;
-        match self.action {
-            Action::Identify => identify(&mut arm),
-            Action::Status => status(&mut arm),
-            Action::Monitor { seconds } => monitor(&mut arm, seconds),
+        let done = self.action.run(&mut arm);
+        remarks::print(&arm.take_remarks());
+        done
+    }
+}
+
+impl Action {
+    fn run(self, arm: &mut RemoteController) -> Result<()> {
+        match self {
+            Action::Identify => identify(arm),
+            Action::Status => status(arm),
+            Action::Monitor { seconds } => monitor(arm, seconds),
             Action::Home => {
                 let ticket = arm.home()?;
-                follow(&mut arm, ticket, "homing")
+                follow(arm, ticket, "homing")
             }
-            Action::Move { theta, phi } => move_to(&mut arm, [theta, phi]),
+            Action::Move { theta, phi } => move_to(arm, [theta, phi]),
             Action::Jog { axis, by } => {
                 let axes = arm.status()?.axes;
                 let mut target = axes.map(|axis| f64::from(axis.encoder_udeg) * 1e-6);
                 target[Axis::from(axis).index()] += by;
-                move_to(&mut arm, target)
+                move_to(arm, target)
             }
             Action::Stop => Ok(arm.stop()?),
             Action::Estop => Ok(arm.emergency_stop()?),
             Action::Clear => Ok(arm.clear_fault()?),
-            Action::Log => log(&mut arm),
-            Action::Settings => settings(&mut arm),
-            Action::Set { axis, key, value } => set(&mut arm, axis.into(), &key, value),
+            Action::Log => log(arm),
+            Action::Settings => settings(arm),
+            Action::Set { axis, key, value } => set(arm, axis.into(), &key, value),
             Action::Save => Ok(arm.save_settings()?),
             Action::Calibrate {
                 axis,
@@ -152,7 +161,7 @@ impl Device {
                 to,
                 stands,
                 absolute,
-            } => calibrate(&mut arm, axis.into(), &spread(from, to, stands)?, absolute),
+            } => calibrate(arm, axis.into(), &spread(from, to, stands)?, absolute),
         }
     }
 }
@@ -258,6 +267,7 @@ fn monitor(arm: &mut RemoteController, seconds: f64) -> Result<()> {
 
 fn print_place(arm: &mut RemoteController) -> Result<()> {
     let status = arm.status()?;
+    remarks::print(&arm.take_remarks());
     let [theta, phi] = status.axes.map(|axis| f64::from(axis.encoder_udeg) * 1e-6);
     outln!(
         "{:>9.1} s  theta {theta:>9.4} deg  phi {phi:>9.4} deg  {}",

@@ -218,11 +218,17 @@ fn a_mirror_and_a_reference_together_are_as_good_as_the_better_of_them() {
             "{:?}",
             found.light
         );
-        (errors(&found.rig, &truth)[0], found.direction_u[0])
+        let of_place = found
+            .numbers
+            .iter()
+            .filter(|n| n.name == "light.distance_m" || n.name.starts_with("light.arm"));
+        let u: Vec<f64> = of_place.map(|n| n.u / n.prior).collect();
+        assert_eq!(u.len(), 6);
+        (errors(&found.rig, &truth)[0], found.direction_u[0], u)
     };
-    let (alone, u_alone) = light_of(reference.clone());
+    let (alone, u_alone, numbers_alone) = light_of(reference.clone());
     let together = [reference, mirror_rows(12, 6)].concat();
-    let (both, u_both) = light_of(together.clone());
+    let (both, u_both, numbers_both) = light_of(together.clone());
     // A mirror that lies 4 mm lower than is said contradicts the reference.
     let mut drawn = nominal(240);
     drawn.target.mirror_height_mm = Some(6.9);
@@ -230,7 +236,14 @@ fn a_mirror_and_a_reference_together_are_as_good_as_the_better_of_them() {
     let said = found.remarks[0].to_string();
     assert!(said.contains("put it apart"), "{:?}", found.remarks);
     eprintln!("alone {alone:?} {u_alone:?}, both {both:?} {u_both:?}");
-    assert!(u_both.p95 < u_alone.p95, "{u_both:?} {u_alone:?}");
+    // Directions are compared at other poses: the mirror's frames have their own. The numbers are the same.
+    let ratios: Vec<f64> = numbers_both
+        .iter()
+        .zip(&numbers_alone)
+        .map(|(b, a)| b / a)
+        .collect();
+    let mean = ratios.iter().sum::<f64>() / 6.0;
+    assert!(mean < 1.0, "{ratios:?}");
     assert!(both[1] < alone[1].max(0.02), "{both:?} {alone:?}");
     assert!(both[0] < 2.0 * u_both.p50, "{both:?} {u_both:?}");
 }
@@ -341,10 +354,12 @@ fn with_beam(rig: &mut Rig) {
 #[test]
 #[ignore = "fifty rigs, ten minutes of a core"]
 fn fifty_rigs_lie_within_their_uncertainties() {
-    let rigs = std::env::var("GONIA_RIGS").map_or(50, |text| text.parse().unwrap());
+    let rigs: Vec<u64> = std::env::var("GONIA_RIGS").map_or((0..50).collect(), |text| {
+        text.split(',').map(|seed| seed.parse().unwrap()).collect()
+    });
     let (mut numbers, mut angles) = (Tally::default(), Tally::default());
     let mut by_name: std::collections::BTreeMap<&str, Vec<f64>> = Default::default();
-    for seed in 0..rigs {
+    for seed in rigs {
         let of = |choices: [f64; 3], every: u64| choices[(seed / every % 3) as usize];
         let px = of([240.0, 320.0, 200.0], 1) as usize;
         let scatter = Scatter {
@@ -572,4 +587,22 @@ impl Tally {
     fn share(&self) -> f64 {
         self.within as f64 / self.of as f64
     }
+}
+
+/// From far off two of them show their lines: a camera of those is but a start.
+#[test]
+fn a_rig_is_found_from_ten_frames() {
+    let truth = crooked(240, 0.5, 21);
+    let rows = random_rows(Role::Reference, 10, 1);
+    let poses: Vec<Pose> = rows.iter().map(|row| row.pose).collect();
+    let found = run(&Rendered::new(&truth, rows, 0.01), 240).unwrap();
+    let said = describe(&found, &truth);
+    let [light, view] = errors_at(poses.into_iter(), [&found.rig, &truth]);
+    assert_eq!(found.frames, [10, 10], "{said}");
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+    assert!(matches!(found.light, LightState::Found { .. }), "{said}");
+    assert!(
+        light[1] < 0.1 && view[1] < 0.03,
+        "{light:?} {view:?} {said}"
+    );
 }

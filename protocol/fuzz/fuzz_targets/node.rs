@@ -3,7 +3,10 @@
 #![no_main]
 
 use gonia_firmware::controller::ArmController;
-use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::driver::DriverBus;
+use gonia_firmware::hardware::{
+    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+};
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::steps::{End, Period, StepProgress};
 use gonia_protocol::NODE_LIGHT;
@@ -30,11 +33,29 @@ impl Hardware for Pins {
         }
     }
     fn halt(&mut self, _: Axis) {}
-    fn encoder_counts(&mut self, _: Axis, _: EncoderSetup) -> Result<u32, EncoderLost> {
-        match self.sensors & 3 {
-            0 => Err(EncoderLost),
-            1 => Ok(u32::MAX),
-            _ => Ok(u32::from(self.sensors) << 10),
+    fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
+        match self.sensors & 7 {
+            0 | 4 => Err(EncoderLost::Silent),
+            1 => Ok(u32::MAX.into()),
+            2 => Err(EncoderLost::Invalid),
+            _ => Ok(EncoderWord {
+                counts: u32::from(self.sensors) << 10,
+                warns: self.sensors & 8 != 0,
+            }),
+        }
+    }
+    fn has_driver_bus(&self, _: DriverBus) -> bool {
+        true
+    }
+    fn ask_driver(&mut self, _: Axis, _: DriverBus, _: DriverBytes, _: usize) -> bool {
+        self.sensors & 16 == 0
+    }
+    fn driver_answer(&mut self, _: Axis, _: DriverBus) -> DriverAnswer {
+        match self.sensors & 96 {
+            0 => DriverAnswer::Waiting,
+            32 => DriverAnswer::Silent,
+            // Any bytes, of any length.
+            _ => DriverAnswer::Bytes([self.sensors; 10][..usize::from(self.sensors % 11)].iter().copied().collect()),
         }
     }
     fn home_switch_closed(&mut self, _: Axis) -> bool {

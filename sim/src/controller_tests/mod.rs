@@ -1,5 +1,7 @@
 //! The firmware's core on a simulated arm, without the wire.
 
+mod drivers;
+mod encoders;
 mod homing;
 mod safety;
 

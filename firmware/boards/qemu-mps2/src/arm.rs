@@ -1,6 +1,9 @@
 //! The arm: real step timers in front of the simulator's motors, its encoders and switches behind.
 
-use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::driver::DriverBus;
+use gonia_firmware::hardware::{
+    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+};
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::settings::Axis;
 use gonia_sim::arm::SimulatedArm;
@@ -33,8 +36,30 @@ impl Hardware for EmulatedArm {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost> {
-        self.0.encoder_counts(axis, setup)
+    fn encoder_word(
+        &mut self,
+        axis: Axis,
+        setup: EncoderSetup,
+    ) -> Result<EncoderWord, EncoderLost> {
+        self.0.encoder_word(axis, setup)
+    }
+
+    fn has_driver_bus(&self, bus: DriverBus) -> bool {
+        self.0.has_driver_bus(bus)
+    }
+
+    fn ask_driver(
+        &mut self,
+        axis: Axis,
+        bus: DriverBus,
+        request: DriverBytes,
+        answer_len: usize,
+    ) -> bool {
+        self.0.ask_driver(axis, bus, request, answer_len)
+    }
+
+    fn driver_answer(&mut self, axis: Axis, bus: DriverBus) -> DriverAnswer {
+        self.0.driver_answer(axis, bus)
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {

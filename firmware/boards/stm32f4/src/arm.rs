@@ -1,17 +1,21 @@
 //! Everything that one arm's controller is wired to.
 
 use embassy_stm32::gpio::Input;
-use gonia_firmware::hardware::{EncoderLost, EncoderSetup, Hardware, NotSaved};
+use gonia_firmware::driver::DriverBus;
+use gonia_firmware::hardware::{
+    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+};
 use gonia_firmware::spi_encoder::SpiEncoder;
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_firmware::store::Store;
 use gonia_protocol::settings::Axis;
 
+use crate::drivers::Drivers;
 use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
 use crate::{alive, now_us, pulses, steps};
 
-/// Pins, encoders and memory; the drivers are with the step timers. Pairs are θ and φ.
+/// Pins, encoders and memory; steps are with their timers. Pairs are θ and φ.
 pub struct ArmPins {
     /// The shafts.
     pub encoders: [SpiEncoder<EncoderSpi>; 2],
@@ -19,6 +23,8 @@ pub struct ArmPins {
     pub home_switches: [Input<'static>; 2],
     /// To ground when closed, where the board has them.
     pub alarms: Option<[Input<'static>; 2]>,
+    /// By which drivers are set, where the board has wires for that.
+    pub drivers: Option<Drivers>,
     /// To ground while the chain is closed, so that a cut wire stops the arm.
     pub interlock: Input<'static>,
     /// Settings.
@@ -53,8 +59,32 @@ impl Hardware for ArmPins {
         steps::halt(axis);
     }
 
-    fn encoder_counts(&mut self, axis: Axis, setup: EncoderSetup) -> Result<u32, EncoderLost> {
-        self.encoders[axis.index()].counts(now_us(), setup)
+    fn encoder_word(
+        &mut self,
+        axis: Axis,
+        setup: EncoderSetup,
+    ) -> Result<EncoderWord, EncoderLost> {
+        self.encoders[axis.index()].word(now_us(), setup)
+    }
+
+    fn has_driver_bus(&self, _: DriverBus) -> bool {
+        self.drivers.is_some()
+    }
+
+    fn ask_driver(
+        &mut self,
+        axis: Axis,
+        bus: DriverBus,
+        request: DriverBytes,
+        answer_len: usize,
+    ) -> bool {
+        let drivers = self.drivers.as_mut();
+        drivers.is_none_or(|drivers| drivers.ask(axis, bus, request, answer_len))
+    }
+
+    fn driver_answer(&mut self, axis: Axis, bus: DriverBus) -> DriverAnswer {
+        let drivers = self.drivers.as_mut();
+        drivers.map_or(DriverAnswer::Silent, |drivers| drivers.answer(axis, bus))
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {

@@ -3,6 +3,7 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Input, OutputType, Pull, Speed};
 use embassy_stm32::pac::gpio::Gpio;
+use embassy_stm32::pac::gpio::vals::{Idr, Ot, Pupdr};
 use gonia_pins::signals::{Signal, function};
 use gonia_pins::{Level, Output, Pin, Wire};
 
@@ -56,6 +57,22 @@ impl Line {
         }
     }
 
+    /// Whether an output drives its high level, or leaves it to a pull-up.
+    pub fn drive_high(self, drives: bool) {
+        let how = if drives {
+            Ot::PUSH_PULL
+        } else {
+            Ot::OPEN_DRAIN
+        };
+        self.port.otyper().modify(|w| w.set_ot(self.number, how));
+    }
+
+    /// The level that is there.
+    #[inline]
+    pub fn is_high(self) -> bool {
+        self.port.idr().read().idr(self.number) == Idr::HIGH
+    }
+
     /// Its level from now on.
     #[inline]
     pub fn set(self, level: Level) {
@@ -64,6 +81,20 @@ impl Line {
             Level::Low => w.set_br(self.number, true),
         });
     }
+}
+
+/// A line that is pulled low or left alone, with a pull-up; left alone now.
+pub fn open_drain(wire: Wire) -> Line {
+    let line = Line::of(wire.pin);
+    line.set(Level::High);
+    line.drive_high(false);
+    let mut pin = Flex::new(any(wire.pin));
+    pin.set_as_input_output(Speed::Low);
+    core::mem::forget(pin);
+    line.port
+        .pupdr()
+        .modify(|w| w.set_pupdr(line.number, Pupdr::PULL_UP));
+    line
 }
 
 /// Switches an output on or off.

@@ -13,6 +13,7 @@
 mod alive;
 mod arm;
 mod before;
+mod drivers;
 mod encoder;
 mod gpio;
 mod pulses;
@@ -50,6 +51,7 @@ use gonia_protocol::{BAUD, NODE_CAMERA, NODE_LIGHT};
 use static_cell::StaticCell;
 
 use crate::arm::ArmPins;
+use crate::drivers::Drivers;
 use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
 
@@ -86,6 +88,7 @@ pub async fn run(of: &'static Pins) -> ! {
         encoders,
         home_switches: of.axes.map(|axis| gpio::switch(axis.home_switch)),
         alarms: of.alarms.map(|alarms| alarms.map(gpio::switch)),
+        drivers: of.drivers.map(Drivers::start),
         interlock: gpio::switch(of.interlock),
         store,
         sectors,

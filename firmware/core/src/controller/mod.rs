@@ -6,8 +6,9 @@
 //! ```
 //! Only [`ArmController::enter`] writes the state. Here: the states, their transitions and the control
 //! tick. In the files beside it: `requests` (what the host may ask for, and when it is refused),
-//! `motion` (homing, moves, settling), `pulses` (the trigger), `events` (for the host).
+//! `motion` (homing, moves, settling), `drivers` (those set by wire), `pulses` (the trigger), `events` (for the host).
 
+mod drivers;
 mod events;
 mod motion;
 mod pulses;
@@ -21,6 +22,7 @@ use gonia_protocol::settings::{Axis, Key};
 use heapless::Deque;
 
 use crate::axis::AxisDrive;
+use crate::driver::DriverWatch;
 use crate::hardware::Hardware;
 use crate::homing::Homing;
 use crate::power::{Power, PowerDemand};
@@ -55,6 +57,7 @@ pub struct ArmController {
     power: Power,
     /// Looks in a row at which the driver's alarm was there.
     alarms: [u8; 2],
+    drivers: [DriverWatch; 2],
     last: Option<(u16, RequestOutcome)>,
     host_watchdog_until_us: u64,
     next_tick_us: u64,
@@ -99,6 +102,7 @@ impl ArmController {
             train: None,
             power: Power::default(),
             alarms: [0; 2],
+            drivers: Default::default(),
             last: None,
             host_watchdog_until_us: 0,
             next_tick_us: now_us,
@@ -165,7 +169,7 @@ impl ArmController {
         }
         if now_us >= self.next_tick_us {
             self.tick(now_us, hardware);
-            let period = if self.is_busy() {
+            let period = if self.is_busy() || self.sets_drivers() {
                 BUSY_TICK_US
             } else {
                 REST_TICK_US
@@ -208,12 +212,18 @@ impl ArmController {
         if let Some(axis) = self.axis_with_alarm(hardware) {
             self.fault_unless_latched(now_us, FaultCode::DRIVER_ALARM, Some(axis), hardware);
         }
+        self.tick_drivers(now_us, hardware);
         self.tick_power(now_us, hardware);
-        for drive in &mut self.drives {
-            let axis = drive.axis();
-            if let Err(code) = drive.read(now_us, &self.settings, hardware) {
+        for axis in Axis::BOTH {
+            let drive = &mut self.drives[axis.index()];
+            let read = drive.read(now_us, &self.settings, hardware);
+            let warns = drive.take_warning();
+            if let Err(code) = read {
                 self.fault_unless_latched(now_us, code, Some(axis), hardware);
                 return;
+            }
+            if warns {
+                self.note_fault(now_us, FaultCode::ENCODER_WARNING, Some(axis));
             }
         }
         if self.needs_host() && now_us > self.host_watchdog_until_us {
@@ -241,7 +251,13 @@ impl ArmController {
             ControllerState::EStop => PowerDemand::Brake,
             // Many a driver forgets its alarm when it is switched off.
             ControllerState::Fault(FaultCode::DRIVER_ALARM) => PowerDemand::Off,
+            ControllerState::Fault(code) if code.is_of_driver() => PowerDemand::Off,
             _ => PowerDemand::Run,
+        };
+        let demand = match demand {
+            // No current, and no brake let go, before the drivers know how much they give.
+            PowerDemand::Run if !self.drivers_are_set() => self.power.as_it_is(),
+            demand => demand,
         };
         let brake_us = self.settings.get_u64(Axis::Theta, Key::BrakeTime);
         self.power.tick(now_us, demand, brake_us, hardware);

@@ -26,6 +26,7 @@ impl ArmController {
         if !self.check_following(now_us, hardware)
             || self.finish_stop(now_us)
             || !self.power.is_ready(now_us)
+            || !self.drivers_are_set()
         {
             return;
         }

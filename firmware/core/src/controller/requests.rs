@@ -7,6 +7,7 @@ use gonia_protocol::message::{
 };
 use gonia_protocol::settings::{Axis, Key};
 
+use super::drivers::can_be_set;
 use super::motion::is_at_home;
 use super::{Answer, ArmController, has_alarm};
 use crate::axis::AxisDrive;
@@ -59,7 +60,7 @@ impl ArmController {
             Message::Disarm => self.disarm(now_us, hardware),
             Message::ReadLatch(pulse) => self.read_latch(*pulse),
             Message::GetSetting(name) => self.get_setting(name.axis, name.key),
-            Message::SetSetting(setting) => self.set_setting(now_us, setting),
+            Message::SetSetting(setting) => self.set_setting(now_us, setting, hardware),
             Message::SaveSettings => self.save_settings(now_us, hardware),
             Message::ReadLog(back) => Ok(Message::LogIs(self.read_log(*back))),
             _ => Err(RequestRefusal::NotUnderstood),
@@ -100,7 +101,7 @@ impl ArmController {
             ControllerState::Fault(code) => {
                 let lost = Axis::BOTH.iter().any(|&axis| {
                     let setup = self.settings.encoder(axis);
-                    hardware.encoder_counts(axis, setup).is_err()
+                    hardware.encoder_word(axis, setup).is_err()
                 });
                 if lost {
                     return Err(RequestRefusal::CauseRemains(code));
@@ -108,6 +109,7 @@ impl ArmController {
             }
             _ => return Ok(Message::Accepted),
         }
+        self.restart_drivers();
         for drive in &mut self.drives {
             if !self.homed {
                 drive.forget_encoder();
@@ -233,14 +235,25 @@ impl ArmController {
         }))
     }
 
-    fn set_setting(&mut self, now_us: u64, setting: &Setting) -> Answer {
+    fn set_setting(
+        &mut self,
+        now_us: u64,
+        setting: &Setting,
+        hardware: &mut impl Hardware,
+    ) -> Answer {
         if !matches!(self.state, ControllerState::Unhomed | ControllerState::Idle) {
             return Err(RequestRefusal::State(self.state));
         }
         let key = Key::from_number(setting.key).ok_or(RequestRefusal::Value)?;
-        self.settings
+        let mut changed = self.settings.clone();
+        changed
             .set(setting.axis, key, setting.value)
             .map_err(|_| RequestRefusal::Value)?;
+        if !can_be_set(&changed, hardware) {
+            return Err(RequestRefusal::Value);
+        }
+        self.settings = changed;
+        self.apply_to_driver(setting.axis, key);
         // What an angle *means* has changed: the old zero is worth nothing.
         if matches!(
             key,
@@ -251,6 +264,9 @@ impl ArmController {
                 | Key::MotorReversed
                 | Key::EncoderReversed
                 | Key::EncoderKind
+                | Key::DriverKind
+                | Key::DriverAddress
+                | Key::Microsteps
         ) || Key::ERROR_MAP.contains(&key)
             || Key::GEAR_MAP.contains(&key)
         {

@@ -1,5 +1,6 @@
 //! What is tried, row by row. Each starts a chip of its own.
 
+mod drivers;
 mod edges;
 mod motion;
 mod registers;
@@ -32,6 +33,8 @@ pub enum When {
     EveryBoard,
     /// The first: what it shows is the same on all.
     OneBoard,
+    /// Every other one: the first shows something like it.
+    OtherBoards,
     /// None.
     Asked,
 }
@@ -45,87 +48,55 @@ pub struct Outcome {
 }
 
 /// Every row.
-pub const ROWS: &[Row] = &[
-    row("boot and hello", When::EveryBoard, boot),
-    row(
-        "registers by the manual",
-        When::EveryBoard,
-        registers::as_the_manual_says,
-    ),
-    row(
-        "homing, 3 poses, trigger pulses",
-        When::EveryBoard,
-        motion::three_poses,
-    ),
-    row(
-        "processor stopped in mid-move",
-        When::EveryBoard,
-        safety::processor_stops,
-    ),
-    row(
-        "hard fault in mid-move",
-        When::EveryBoard,
-        safety::hard_fault,
-    ),
-    row(
-        "reset in mid-move",
-        When::EveryBoard,
-        safety::reset_in_mid_move,
-    ),
-    row(
-        "emergency stop and clear",
-        When::OneBoard,
-        safety::emergency_stop,
-    ),
-    row(
-        "settings saved, read after reset",
-        When::EveryBoard,
-        settings::saved,
-    ),
-    row(
-        "settings that nothing can do",
-        When::OneBoard,
-        settings::refused,
-    ),
-    row(
-        "power lost in an erase",
-        When::Asked,
-        settings::power_lost_in_an_erase,
-    ),
-    row("chain cut in mid-move", When::Asked, safety::chain_cut),
-    row(
-        "encoder lost in mid-move",
-        When::Asked,
-        motion::encoder_lost,
-    ),
-    row("motor stalls in mid-move", When::Asked, motion::stall),
-    row(
-        "motor stalls in a stop",
-        When::OneBoard,
-        motion::stall_in_a_stop,
-    ),
-    row("host gone in mid-move", When::Asked, motion::host_gone),
-    row(
-        "cam of every turn on two turns",
-        When::Asked,
-        motion::turn_cam,
-    ),
-    row("home switch cut", When::Asked, motion::home_switch_cut),
-    row("BiSS-C rings", When::OneBoard, motion::biss_rings),
-    row(
-        "BiSS-C bit flipped in mid-move",
-        When::Asked,
-        motion::biss_bit_flips,
-    ),
-    row("homing by BiSS-C", When::Asked, motion::homing_by_biss),
-    row(
-        "driver's alarm and brakes",
-        When::EveryBoard,
-        safety::driver_alarm,
-    ),
-    row("reversed motor and encoder", When::Asked, motion::reversed),
-    row("homing and 50 poses", When::Asked, motion::fifty_poses),
-];
+pub const ROWS: &[Row] = {
+    use When::{Asked, EveryBoard, OneBoard, OtherBoards};
+    &[
+        row("boot, registers by the manual", EveryBoard, boot),
+        row(
+            "homing, 3 poses, trigger pulses",
+            EveryBoard,
+            motion::three_poses,
+        ),
+        row(
+            "processor stopped in mid-move",
+            EveryBoard,
+            safety::processor_stops,
+        ),
+        row("drivers set by UART", OtherBoards, drivers::by_uart),
+        row("drivers set by SPI", OneBoard, drivers::by_spi),
+        row("hard fault in mid-move", OneBoard, safety::hard_fault),
+        row("reset in mid-move", OneBoard, safety::reset_in_mid_move),
+        row("emergency stop and clear", OneBoard, safety::emergency_stop),
+        row(
+            "settings saved, read after reset",
+            OneBoard,
+            settings::saved,
+        ),
+        row("settings that nothing can do", Asked, settings::refused),
+        row(
+            "power lost in an erase",
+            Asked,
+            settings::power_lost_in_an_erase,
+        ),
+        row("chain cut in mid-move", Asked, safety::chain_cut),
+        row("encoder lost in mid-move", Asked, motion::encoder_lost),
+        row("motor stalls in mid-move", Asked, motion::stall),
+        row("motor stalls in a stop", Asked, motion::stall_in_a_stop),
+        row("host gone in mid-move", Asked, motion::host_gone),
+        row("cam of every turn on two turns", Asked, motion::turn_cam),
+        row("home switch cut", Asked, motion::home_switch_cut),
+        row("BiSS-C rings", OneBoard, motion::biss_rings),
+        row(
+            "BiSS-C bit flipped in mid-move",
+            Asked,
+            motion::biss_bit_flips,
+        ),
+        row("homing by BiSS-C", Asked, motion::homing_by_biss),
+        row("driver's alarm and brakes", OneBoard, safety::driver_alarm),
+        row("reversed motor and encoder", Asked, motion::reversed),
+        row("homing and 50 poses", Asked, motion::fifty_poses),
+    ]
+};
 
 const fn row(name: &'static str, when: When, run: fn(&Path) -> Result<Outcome>) -> Row {
     Row { name, run, when }
@@ -177,5 +148,9 @@ fn boot(elf: &Path) -> Result<Outcome> {
     );
     let byte_ns = lock(&rig.world).wire.byte_ns.unwrap_or(0);
     let baud = 1e10 / byte_ns.max(1) as f64;
-    done(rig, format!("{}, {baud:.0} baud", identity.board))
+    let registers = registers::as_the_manual_says(&mut rig)?;
+    done(
+        rig,
+        format!("{}, {baud:.0} baud; {registers}", identity.board),
+    )
 }

@@ -8,7 +8,8 @@
 //! the step timers makes the edges: no processor, no step.
 
 use crate::{
-    Axis, Board, Crystal, Encoder, Layout, Level, Output, Pin, StepEdge, TimerOutput, wire,
+    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin, StepEdge,
+    TimerOutput, wire,
 };
 
 /// The bootloader that the board is sold with has the first 32 kB. Settings in the last two sectors, of 128 kB,
@@ -51,6 +52,19 @@ pub const BTT_OCTOPUS: Board = Board {
             home_switch: wire(Pin::new('G', 13), "STOP_5"),
         },
     ],
+    // Each socket has one pin for PDN_UART or CS, by its jumpers; all share SPI1.
+    drivers: Some(DriverWires {
+        lines: [
+            wire(Pin::new('C', 4), "socket MOTOR0"),
+            wire(Pin::new('D', 11), "socket MOTOR1"),
+        ],
+        spi: DriverSpi {
+            spi: 1,
+            clock: wire(Pin::new('A', 5), "all sockets"),
+            out: wire(Pin::new('A', 7), "all sockets"),
+            data: wire(Pin::new('A', 6), "all sockets"),
+        },
+    }),
     enables: &[
         Output {
             wire: wire(Pin::new('F', 14), "socket MOTOR0"),
@@ -67,10 +81,11 @@ pub const BTT_OCTOPUS: Board = Board {
         channel: 2,
         is_complementary: true,
     },
+    // The pin that leads to PDN_UART or CS of a socket that is left empty.
     brakes: Some(TimerOutput {
-        wire: wire(Pin::new('A', 7), "EXP2-6"),
+        wire: wire(Pin::new('C', 6), "socket MOTOR2: CS"),
         channel: 1,
-        is_complementary: true,
+        is_complementary: false,
     }),
     // DIAG of the modules in MOTOR0 and MOTOR1, by the board's own jumpers: low while all is well.
     alarms: Some([

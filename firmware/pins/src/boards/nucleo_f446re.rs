@@ -1,7 +1,8 @@
 //! NUCLEO-F446RE, for drivers in boxes of their own. Places are those of ST's user manual UM1724.
 
 use crate::{
-    Axis, Board, Crystal, Encoder, Layout, Level, Output, Pin, StepEdge, TimerOutput, wire,
+    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin, StepEdge,
+    TimerOutput, wire,
 };
 
 /// Settings in sectors 1 and 2, of 16 kB, which are erased in half a second; the program lies behind them.
@@ -43,6 +44,15 @@ pub const NUCLEO_F446RE: Board = Board {
             home_switch: wire(Pin::new('C', 1), "A4"),
         },
     ],
+    drivers: Some(DriverWires {
+        lines: [wire(Pin::new('A', 8), "D7"), wire(Pin::new('A', 10), "D2")],
+        spi: DriverSpi {
+            spi: 3,
+            clock: wire(Pin::new('C', 10), "CN7-1"),
+            out: wire(Pin::new('C', 12), "CN7-3"),
+            data: wire(Pin::new('C', 11), "CN7-2"),
+        },
+    }),
     enables: &[Output {
         wire: wire(Pin::new('C', 3), "CN7-37"),
         on: Level::High,

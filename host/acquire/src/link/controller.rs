@@ -2,14 +2,17 @@
 
 use std::collections::VecDeque;
 
+use gonia_protocol::fault::FaultCode;
 use gonia_protocol::link::{IncomingPacket, NextAction, Requester, RetryPolicy};
 use gonia_protocol::message::{
-    Completed, Hello, Identity, Latch, LogEntry, Message, Move, RequestRefusal, Setting,
+    Completed, Faulted, Hello, Identity, Latch, LogEntry, Message, Move, RequestRefusal, Setting,
     SettingName, Status, Telemetry, TriggerRequest,
 };
 use gonia_protocol::packet::{Decoder, encode};
 use gonia_protocol::settings::{Axis, Key};
 use gonia_protocol::{NODE_ANY, NODE_CAMERA, NODE_LIGHT, PROTOCOL_VERSION, SCHEMA_KEY};
+
+use gonia_rig::Remark;
 
 use crate::link::{LinkError, Transport};
 
@@ -23,6 +26,8 @@ const MAX_LATCHES: usize = 64;
 /// Ends that are kept until they are claimed. Nobody waits for more than a move and a trigger at a time;
 /// those of requests that were given up would otherwise live until their number comes again.
 const MAX_COMPLETED: usize = 32;
+/// Warnings that are kept until somebody takes them.
+const MAX_WARNINGS: usize = 32;
 /// Bytes that are kept of what comes first from the other end.
 const MAX_HEARD: usize = 256;
 
@@ -47,6 +52,8 @@ pub struct RemoteController {
     telemetry: Option<Telemetry>,
     last_event: Option<u32>,
     events_lost: u32,
+    /// Warnings that nobody has taken yet.
+    warnings: Vec<(FaultCode, Option<Axis>)>,
     heard_us: u64,
     asked_us: u64,
     heartbeat_us: u64,
@@ -103,6 +110,7 @@ impl RemoteController {
             telemetry: None,
             last_event: None,
             events_lost: 0,
+            warnings: Vec::new(),
             heard_us: now_us,
             asked_us: now_us,
             heartbeat_us: now_us,
@@ -150,6 +158,25 @@ impl RemoteController {
     /// Events that never arrived, and requests that had to be repeated, so far.
     pub fn losses(&self) -> (u32, u32) {
         (self.events_lost, self.link.repeats())
+    }
+
+    /// What the controller has warned of since the last call: the arm goes on, and a person should know.
+    pub fn take_remarks(&mut self) -> Vec<Remark> {
+        let warnings = std::mem::take(&mut self.warnings);
+        let remarks = warnings.into_iter().map(|(code, axis)| {
+            let axis = match axis {
+                Some(Axis::Theta) => ", θ",
+                Some(Axis::Phi) => ", φ",
+                None => "",
+            };
+            let place = format!("{}{axis}", self.arm);
+            let (symptom, cure) = code.page().map_or(
+                ("a warning that this host does not know", "update the host"),
+                |page| (page.symptom, page.cure),
+            );
+            Remark::new(place, format_args!("{symptom} (code {})", code.0), cure)
+        });
+        remarks.collect()
     }
 
     /// The newest telemetry; `None` before the first.
@@ -249,7 +276,7 @@ impl RemoteController {
             .map(drop)
     }
 
-    /// The faults that the controller remembers since it started, newest first.
+    /// The faults and warnings that the controller remembers since it started, newest first.
     pub fn log(&mut self) -> Result<Vec<LogEntry>, LinkError> {
         let mut entries = Vec::new();
         for back in 0..=u8::MAX {
@@ -537,6 +564,11 @@ impl RemoteController {
             Message::Telemetry(telemetry) => self.telemetry = Some(telemetry),
             Message::Pulse(latch) if self.latches.len() < MAX_LATCHES => {
                 self.latches.push_back(latch)
+            }
+            Message::Faulted(Faulted { code, axis, .. })
+                if code.is_warning() && self.warnings.len() < MAX_WARNINGS =>
+            {
+                self.warnings.push((code, axis));
             }
             // A fault ends whatever was under way, and that says which fault it was.
             _ => {}

@@ -4,7 +4,7 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
 use super::places::{Near, distance2, exchanged, radius_of};
-use super::quadratic::{Cells, Nodes, weights};
+use super::quadratic::{Cells, Few, Nodes, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
 use crate::direction::Direction;
@@ -20,17 +20,22 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 /// Side of the patches of directions that the work begins with, degrees.
 const PATCH_DEG: f64 = 16.0;
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
-const SHARED: f64 = 0.8;
+const SHARED: f64 = 1.0;
 /// Quarters of the neighbours of one place that a system of many has.
-const NEIGHBOURS: usize = 6;
+const NEIGHBOURS: usize = 7;
 /// So many images of the data, or fewer, make one system for all cells.
 const ONE_SYSTEM: usize = 192;
 /// Cells are interpolated where that is off by less than this share of the standard error …
-const TOLERANCE: f64 = 0.1;
+const TOLERANCE: f64 = 0.15;
 /// … or than this share of the value.
 const TOLERANCE_MIN: f64 = 1e-3;
 /// So many cells are not worth a test.
-const DIRECT: usize = 100;
+const DIRECT: usize = 40;
+/// Cells whose reach is beyond so many times what they may share, by the radius around those that they are half of, are
+/// halved again without a search.
+const HALVED_AGAIN: f64 = 1.15;
+/// Places between cells are so many parts of a step apart.
+const PARTS: f64 = 4.0;
 
 /// Planes that many threads write to, each cell once.
 struct Shared(Vec<Vec<AtomicU32>>);
@@ -99,6 +104,13 @@ struct Systems {
 }
 
 impl Systems {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+        match self.reciprocal {
+            None => self.own.logs_at(place, work),
+            Some(_) => self.at(place, false, work).value.map(f64::natural_log),
+        }
+    }
+
     fn at(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted {
         match &self.reciprocal {
             None => self.own.at_with(place, with_error, work),
@@ -138,6 +150,17 @@ struct Filler<'a> {
     /// The system of all data, where they are few.
     one: Option<Systems>,
     arch: Arch,
+    /// Sine and cosine of every quarter of a step, up to a turn.
+    angles: Vec<(f64, f64)>,
+}
+
+/// Logarithms on lines through the middle of a part.
+struct Lines {
+    middle: [f64; 3],
+    /// First and last along each axis, where that is longer than its nodes.
+    ends: [[[f64; 3]; 2]; 4],
+    /// How far logarithms are from quadratic, axis by axis.
+    bends: [f64; 4],
 }
 
 impl ScatteredFit {
@@ -160,6 +183,13 @@ impl ScatteredFit {
             errors: with_errors.then(|| Shared::new(grid, channels)),
             one: None,
             arch: Arch::new(),
+            angles: (0..=(PARTS as usize * grid.n_phi()))
+                .map(|k| {
+                    (k as f64 / PARTS * grid.step_deg())
+                        .to_radians()
+                        .sine_cosine()
+                })
+                .collect(),
         };
         if self.places.images() <= ONE_SYSTEM {
             let pole = Direction::from_deg(0.0, 0.0).to_vec3();
@@ -170,7 +200,9 @@ impl ScatteredFit {
         pairs(grid, self.choice.settings.symmetry)
             .par_iter()
             .with_max_len(8)
-            .for_each_init(Memory::default, |memory, cells| filler.fill(*cells, memory));
+            .for_each_init(Memory::default, |memory, cells| {
+                filler.fill(*cells, f64::INFINITY, memory)
+            });
         let errors = filler.errors.map(|errors| errors.into_planes(grid));
         (
             DenseBrdf::from_planes(grid, filler.values.into_planes(grid)),
@@ -248,10 +280,13 @@ impl Neighbourhood {
 
 impl Filler<'_> {
     fn place(&self, [i, phi_i, v, phi_v]: [f64; 4]) -> Pair {
-        let step = self.grid.step_deg();
-        let light = Direction::from_deg(i * step, phi_i * step).to_vec3();
-        let view = Direction::from_deg(v * step, phi_v * step).to_vec3();
-        self.fit.choice.settings.coordinates.pair(light, view)
+        let of = |x: f64| self.angles[(PARTS * x).round() as usize];
+        let direction = |theta: f64, phi: f64| {
+            let ((sin_theta, cos_theta), (sin_phi, cos_phi)) = (of(theta), of(phi));
+            [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta]
+        };
+        let coordinates = self.fit.choice.settings.coordinates;
+        coordinates.pair(direction(i, phi_i), direction(v, phi_v))
     }
 
     fn near(&self, place: Pair, many: usize) -> Neighbourhood {
@@ -275,7 +310,8 @@ impl Filler<'_> {
     }
 
     /// Fills cells: by one system where they are small against its neighbourhood, else half by half.
-    fn fill(&self, cells: Cells, memory: &mut Memory) {
+    /// `around` is the radius around those that they are half of.
+    fn fill(&self, cells: Cells, around: f64, memory: &mut Memory) {
         let number = |row: usize, column: usize| row * self.grid.n_phi() + column;
         let first_light = number(cells.start[0], cells.start[1]);
         if cells.is_own && first_light > number(cells.end[2] - 1, cells.end[3] - 1) {
@@ -290,11 +326,17 @@ impl Filler<'_> {
             .map(|bits| distance2(&self.place(cells.corner(bits)), &middle))
             .fold(0.0, f64::max)
             .sqrt();
+        let halve = |radius: f64, memory: &mut Memory| {
+            for half in cells.halves(self.longest(&cells)) {
+                self.fill(half, radius, memory);
+            }
+        };
+        if cells.count() > 1 && reach > HALVED_AGAIN * SHARED * around {
+            return halve(around, memory);
+        }
         let near = self.near(middle, NEIGHBOURS * self.fit.choice.settings.neighbours / 4);
         if cells.count() > 1 && reach > SHARED * near.radius() {
-            for half in cells.halves(self.longest(&cells)) {
-                self.fill(half, memory);
-            }
+            halve(near.radius(), memory);
         } else if let Some(systems) = self.systems(&near) {
             self.share(&systems, cells, memory);
         }
@@ -360,25 +402,24 @@ impl Filler<'_> {
             let [lights, views] = [0, 2].map(|axis| part.directions(axis, self.grid, 0));
             for light in &lights {
                 for view in &views {
-                    let [l, v] = [light, view].map(|d| self.grid.direction(*d).to_vec3());
-                    let place = self.fit.choice.settings.coordinates.pair(l, v);
-                    let at = shares.systems.at(&place, false, &mut memory.work);
-                    for (values, value) in channels.iter_mut().zip(at.value) {
-                        values.push(value);
+                    let n_phi = self.grid.n_phi();
+                    let [l, v] = [*light, *view].map(|d| [d / n_phi, d % n_phi].map(|x| x as f64));
+                    let place = self.place([l[0], l[1], v[0], v[1]]);
+                    let logs = shares.systems.logs_at(&place, &mut memory.work);
+                    for (values, log) in channels.iter_mut().zip(logs) {
+                        values.push(log);
                     }
                 }
             }
+            for values in &mut channels {
+                exponentials(self.arch, values);
+            }
             return self.store(shares, part, &channels, memory);
         }
-        let bends = self.bends(shares, &part, &mut memory.work);
+        let lines = self.lines(shares, &part, &mut memory.work);
+        let bends = lines.bends;
         if bends.iter().sum::<f64>() <= shares.tolerance {
-            let mut nodes = vec![Vec::with_capacity(81); self.channels];
-            self.each_node(&part, |place| {
-                let at = shares.systems.at(&place, false, &mut memory.work);
-                for (nodes, value) in nodes.iter_mut().zip(at.value) {
-                    nodes.push(value.natural_log());
-                }
-            });
+            let mut nodes = self.nodes(shares, &part, &lines, &mut memory.work);
             if self.meets_between(shares, &part, &nodes, &mut memory.work) {
                 for values in &mut nodes {
                     memory.values.clear();
@@ -403,35 +444,67 @@ impl Filler<'_> {
         }
     }
 
-    /// How far logarithms through the middle of a part are from quadratic, axis by axis.
-    fn bends(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> [f64; 4] {
-        let mut logs = |at: [f64; 4]| {
-            let at = shares.systems.at(&self.place(at), false, work);
-            at.value.map(f64::natural_log)
-        };
-        let middle = part.middle();
-        let of_middle = logs(middle);
-        std::array::from_fn(|axis| {
-            // Three cells are nodes themselves.
-            if part.length(axis) <= 3 {
-                return 0.0;
+    /// Logarithms at all nodes of a part, channel by channel.
+    fn nodes(
+        &self,
+        shares: &Shares<'_>,
+        part: &Cells,
+        lines: &Lines,
+        work: &mut Work,
+    ) -> Vec<Vec<f64>> {
+        if (0..4).all(|axis| part.length(axis) > 2) {
+            let corners: [[f64; 3]; 16] = std::array::from_fn(|bits| {
+                let place = self.place(part.corner(bits));
+                shares.systems.logs_at(&place, work)
+            });
+            let few = |c: usize| Few {
+                middle: lines.middle[c],
+                ends: lines.ends.map(|ends| ends.map(|end| end[c])),
+                corners: corners.map(|corner| corner[c]),
+            };
+            return (0..self.channels).map(|c| few(c).all()).collect();
+        }
+        let mut nodes = vec![Vec::new(); self.channels];
+        self.each_node(part, |place| {
+            let logs = shares.systems.logs_at(&place, work);
+            for (nodes, log) in nodes.iter_mut().zip(logs) {
+                nodes.push(log);
             }
+        });
+        nodes
+    }
+
+    fn lines(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> Lines {
+        let mut logs = |at: [f64; 4]| shares.systems.logs_at(&self.place(at), work);
+        let at = part.middle();
+        let middle = logs(at);
+        let mut ends = [[middle; 2]; 4];
+        let mut bends = [0.0; 4];
+        // Two cells are nodes themselves, and so are three.
+        for axis in (0..4).filter(|axis| part.length(*axis) > 2) {
             let mut along = |share: f64| {
-                let mut place = middle;
+                let mut place = at;
                 place[axis] = part.at(axis, share);
                 logs(place)
             };
-            let (first, last) = (along(0.0), along(1.0));
-            [0.25, 0.75]
-                .map(|share| {
-                    let (found, w) = (along(share), weights(share));
-                    let between = |c: usize| w[0] * first[c] + w[1] * of_middle[c] + w[2] * last[c];
-                    let off = (0..self.channels).map(|c| (found[c] - between(c)).abs());
-                    off.fold(0.0, f64::max)
-                })
-                .into_iter()
-                .fold(0.0, f64::max)
-        })
+            ends[axis] = [along(0.0), along(1.0)];
+            if part.length(axis) == 3 {
+                continue;
+            }
+            for share in [0.25, 0.75] {
+                let (found, w) = (along(share), weights(share));
+                for c in 0..self.channels {
+                    let [first, last] = ends[axis].map(|end| end[c]);
+                    let between = w[0] * first + w[1] * middle[c] + w[2] * last;
+                    bends[axis] = (found[c] - between).abs().max(bends[axis]);
+                }
+            }
+        }
+        Lines {
+            middle,
+            ends,
+            bends,
+        }
     }
 
     /// Whether the nodes of a part determine its values aside of the middles, too.
@@ -454,15 +527,15 @@ impl Filler<'_> {
                 };
                 aside.end[axis] = aside.start[axis] + 1;
             }
-            let found = shares.systems.at(&self.place(aside.middle()), false, work);
-            nodes.iter().zip(found.value).all(|(values, found)| {
+            let found = shares.systems.logs_at(&self.place(aside.middle()), work);
+            nodes.iter().zip(found).all(|(values, found)| {
                 let mut between = Vec::with_capacity(1);
                 let nodes = Nodes {
                     cells: part,
                     values,
                 };
                 nodes.between(&aside, &mut between);
-                let off = |between: &f64| (between - found.natural_log()).abs();
+                let off = |between: &f64| (between - found).abs();
                 between.iter().all(|b| off(b) <= shares.tolerance)
             })
         })

@@ -108,6 +108,9 @@ pub struct Choice {
     pub contradicted_by: Option<f64>,
     /// By what standard errors are multiplied.
     pub error_factor: f64,
+    /// Whether a plane of symmetry was asked for that is not determined, and none is taken: data lie too rarely on both
+    /// sides of it.
+    pub plane_undetermined: bool,
 }
 
 impl Choice {
@@ -119,6 +122,7 @@ impl Choice {
             log_error: None,
             contradicted_by: None,
             error_factor: UNTESTED_FACTOR,
+            plane_undetermined: false,
         }
     }
 }
@@ -192,7 +196,13 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
         log_error: Some(best.error),
         contradicted_by,
         error_factor: best.factor(),
+        plane_undetermined: asks_for_plane(asked) && best.settings.symmetry.plane().is_none(),
     }
+}
+
+fn asks_for_plane(asked: Option<SymmetryKind>) -> bool {
+    use SymmetryKind::{Bilateral, HalfTurnBilateral};
+    matches!(asked, Some(Bilateral | HalfTurnBilateral))
 }
 
 /// What is taken of too few data to test anything by.
@@ -230,7 +240,10 @@ fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, asked: Option<Symmetr
         Some(SymmetryKind::Bilateral) => (false, true),
         _ => return start,
     };
-    let plane = mirror_plane(tests.data, start.settings);
+    let mirror = mirror_plane(tests.data, start.settings);
+    let Some(plane) = mirror.plane else {
+        return start;
+    };
     let trial = |symmetry: fn(MirrorPlane) -> Symmetry| {
         tests.trial(Settings {
             symmetry: symmetry(plane),
@@ -250,7 +263,12 @@ fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, asked: Option<Symmetr
     if asked.is_none() {
         all.extend(of(Symmetry::None));
     }
-    simplest(&all, tests, usual, false)
+    let best = simplest(&all, tests, usual, false);
+    // One that the data contradict is not the one that was asked for where that may be another.
+    if asked.is_some() && !mirror.is_determined && worse(&best, &start, usual) {
+        return start;
+    }
+    best
 }
 
 /// The error without the symmetry that was asked for, where the data contradict that.

@@ -198,13 +198,34 @@ impl Local {
         self.at_with(place, true, &mut Vec::new())
     }
 
+    /// Logarithms of the values there alone, channel by channel: of data of one channel the first.
+    pub fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+        if self.response == Response::Linear {
+            return self.at_with(place, false, work).value.map(f64::natural_log);
+        }
+        covariances(self.arch, &self.at, self.covariance, place, work);
+        let mut logs = [0.0; 3];
+        for (log, channel) in logs.iter_mut().zip(&self.channels) {
+            *log = self.fitted(channel, work) + self.below(channel);
+        }
+        logs
+    }
+
+    /// What is kriged, at the place with these covariances.
+    fn fitted(&self, channel: &Channel, covariances: &[f64]) -> f64 {
+        let fitted = channel.mean + dot(self.arch, covariances, &channel.weights);
+        fitted.clamp(channel.limits.0, channel.limits.1)
+    }
+
+    /// Noise that is as much above as below lies lower in logarithms, by half its variance.
+    fn below(&self, channel: &Channel) -> f64 {
+        0.5 * (self.nugget * channel.signal * self.shares).min(NOISE_MAX)
+    }
+
     /// The same; without its error, which takes most of the time, that is 0.
     pub fn at_with(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted {
         covariances(self.arch, &self.at, self.covariance, place, work);
-        let fitted = self
-            .channels
-            .iter()
-            .map(|c| (c.mean + dot(self.arch, work, &c.weights)).clamp(c.limits.0, c.limits.1));
+        let fitted = self.channels.iter().map(|c| self.fitted(c, work));
         let mut predicted = Predicted {
             value: [0.0; 3],
             relative: [0.0; 3],
@@ -224,11 +245,9 @@ impl Local {
             let error = (unit * channel.signal).sqrt();
             match self.response {
                 Response::Logarithm => {
-                    // Noise that is as much above as below lies lower in logarithms, by half its variance.
                     let noise = self.nugget * channel.signal;
                     predicted.noise[c] = (1.0 - self.hidden) * noise;
-                    predicted.value[c] =
-                        (fitted + 0.5 * (noise * self.shares).min(NOISE_MAX)).exponential();
+                    predicted.value[c] = (fitted + self.below(channel)).exponential();
                     predicted.relative[c] = (error * error + self.hidden * noise).sqrt();
                 }
                 Response::Linear => {

@@ -483,6 +483,42 @@ mod tests {
     }
 
     #[test]
+    fn a_plane_of_which_one_side_was_measured_is_not_taken() {
+        // Tilted fibres: a plane along x, far from which nothing is alike; lights and views on one side of it, and in one
+        // quarter of azimuths.
+        let value = |l: Direction, v: Direction| {
+            material(l, v, 1.4, 0.0) * (1.0 + 0.3 * (l.to_vec3()[0] + v.to_vec3()[0]))
+        };
+        for (low, high) in [(0.0, 180.0), (20.0, 110.0)] {
+            let of_side: Vec<Sample> = samples(9000, false, |l, v, normal| {
+                value(l, v) * (1.0 + 0.005 * normal)
+            })
+            .into_iter()
+            .filter(|s| {
+                [s.phi_i_deg, s.phi_v_deg]
+                    .iter()
+                    .all(|phi| (low..high).contains(phi))
+            })
+            .take(700)
+            .collect();
+            let far_off = |fit: &ScatteredFit| {
+                let plane = fit.choice().settings.symmetry.plane();
+                let off = |p: crate::symmetry::MirrorPlane| (p.azimuth_deg() + 90.0) % 180.0 - 90.0;
+                plane.is_some_and(|p| off(p).abs() > 3.0)
+            };
+            let auto = ScatteredFit::new(&of_side, None).unwrap();
+            assert!(!far_off(&auto), "{low}: {}", auto.choice().settings);
+            let asked = ScatteredFit::new(&of_side, Some(SymmetryKind::Bilateral)).unwrap();
+            assert!(!far_off(&asked), "{low}: {}", asked.choice().settings);
+            let symmetry = asked.choice().settings.symmetry;
+            assert_eq!(
+                asked.choice().plane_undetermined,
+                symmetry.plane().is_none()
+            );
+        }
+    }
+
+    #[test]
     fn a_symmetry_that_is_contradicted_is_taken_and_said() {
         let anisotropic = of_material(800, false, 1.5, 0.0);
         let asked = ScatteredFit::new(&anisotropic, Some(SymmetryKind::Isotropic)).unwrap();

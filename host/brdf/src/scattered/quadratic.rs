@@ -90,6 +90,59 @@ pub(super) fn weights(t: f64) -> [f64; 3] {
     ]
 }
 
+/// Of four axes with three nodes each, values at the middle, at both ends of each axis through it, and at the corners by
+/// their bits …
+pub(super) struct Few {
+    pub middle: f64,
+    pub ends: [[f64; 2]; 4],
+    pub corners: [f64; 16],
+}
+
+impl Few {
+    /// … and at all 81 nodes by the quadratic along each axis and all products of axes that these determine.
+    pub fn all(&self) -> Vec<f64> {
+        let mut slopes = [0.0; 4];
+        let mut bends = [0.0; 4];
+        for (axis, [first, last]) in self.ends.iter().enumerate() {
+            slopes[axis] = 0.5 * (last - first);
+            bends[axis] = 0.5 * (last + first) - self.middle;
+        }
+        let signs = |bits: usize| [0, 1, 2, 3].map(|axis| (bits >> axis & 1) as f64 * 2.0 - 1.0);
+        // What is left at the corners, as sums and differences along each axis: the share of each product of axes.
+        let mut products: [f64; 16] = std::array::from_fn(|bits| {
+            let along = |axis: usize| slopes[axis] * signs(bits)[axis] + bends[axis];
+            self.corners[bits] - self.middle - (0..4).map(along).sum::<f64>()
+        });
+        for axis in 0..4 {
+            for bits in (0..16).filter(|bits| bits >> axis & 1 == 0) {
+                let (low, high) = (products[bits], products[bits | 1 << axis]);
+                products[bits] = 0.5 * (high + low);
+                products[bits | 1 << axis] = 0.5 * (high - low);
+            }
+        }
+        let mut all = Vec::with_capacity(81);
+        for node in 0..81usize {
+            let t = [27, 9, 3, 1].map(|step| (node / step % 3) as f64 - 1.0);
+            let squares = t.map(|t| t * t);
+            let planar = squares.iter().sum::<f64>();
+            let mut value = self.middle;
+            for axis in 0..4 {
+                value += slopes[axis] * t[axis] + bends[axis] * squares[axis];
+                // What goes with an axis at the corners and not on it goes with the squares of the others.
+                value += products[1 << axis] * t[axis] * (planar - squares[axis]) / 3.0;
+            }
+            let pairs = 0.5 * (planar * planar - planar);
+            value += products[0] * pairs / 6.0;
+            for bits in (0..16usize).filter(|bits| bits.count_ones() > 1) {
+                let along = |axis: usize| if bits >> axis & 1 == 1 { t[axis] } else { 1.0 };
+                value += products[bits] * along(0) * along(1) * along(2) * along(3);
+            }
+            all.push(value);
+        }
+        all
+    }
+}
+
 /// Values at the nodes of a box, those of the last axis next to each other.
 pub(super) struct Nodes<'a> {
     pub cells: &'a Cells,
@@ -133,6 +186,30 @@ fn combine(weights: &[f64; 3], count: usize, values: &[f64], out: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn few_nodes_determine_what_is_quadratic_and_all_products_of_axes() {
+        let value = |t: [f64; 4]| {
+            let squares = 0.3 * t[0] * t[0] - 0.2 * t[1] + 0.7 * t[3] * t[3];
+            squares + 0.4 * t[0] * t[2] - 0.1 * t[1] * t[2] * t[3] + 0.6 * t[0] * t[1] * t[2] * t[3]
+        };
+        let end = |axis: usize, t: f64| {
+            let mut place = [0.0; 4];
+            place[axis] = t;
+            value(place)
+        };
+        let few = Few {
+            middle: value([0.0; 4]),
+            ends: [0, 1, 2, 3].map(|axis| [end(axis, -1.0), end(axis, 1.0)]),
+            corners: std::array::from_fn(|bits| {
+                value([0, 1, 2, 3].map(|axis| (bits >> axis & 1) as f64 * 2.0 - 1.0))
+            }),
+        };
+        for (node, found) in few.all().into_iter().enumerate() {
+            let t = [27, 9, 3, 1].map(|step| (node / step % 3) as f64 - 1.0);
+            assert!((found - value(t)).abs() < 1e-12, "{t:?}: {found}");
+        }
+    }
 
     #[test]
     fn what_is_quadratic_is_met_at_every_cell_of_boxes_of_any_size() {

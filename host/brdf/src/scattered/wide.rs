@@ -10,30 +10,59 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Parts of a sum.
 const LANES: usize = 16;
+/// Numbers that are worked on at a time. Columns are as long as a multiple of it: a loop over the rest, one by one,
+/// would take as long as all others.
+const WIDTH: usize = 8;
+/// Columns of a factor that are worked on at a time.
+const PANEL: usize = 4;
 
-/// Places, axis by axis.
+/// The next multiple of [`WIDTH`].
+fn padded(n: usize) -> usize {
+    n.next_multiple_of(WIDTH)
+}
+
+/// Places, axis by axis; on each the last one again up to a multiple of [`WIDTH`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Axes {
-    axes: [Vec<f64>; 6],
+    n: usize,
+    all: Vec<f64>,
 }
 
 impl Axes {
-    pub fn of(places: impl Iterator<Item = Pair>) -> Self {
-        let mut axes: [Vec<f64>; 6] = Default::default();
-        for place in places {
-            for (axis, x) in axes.iter_mut().zip(place) {
-                axis.push(x);
+    pub fn of(places: impl Iterator<Item = Pair> + Clone) -> Self {
+        let n = places.clone().count();
+        let rows = padded(n);
+        let mut all = vec![0.0; 6 * rows];
+        for (k, place) in places.enumerate() {
+            for (axis, x) in place.into_iter().enumerate() {
+                all[axis * rows + k] = x;
             }
         }
-        Self { axes }
+        for axis in all.chunks_exact_mut(rows.max(1)) {
+            let last = axis[n - 1];
+            axis[n..].fill(last);
+        }
+        Self { n, all }
     }
 
     pub fn len(&self) -> usize {
-        self.axes[0].len()
+        self.n
     }
 
+    #[inline(always)]
     fn place(&self, k: usize) -> Pair {
-        [0, 1, 2, 3, 4, 5].map(|a| self.axes[a][k])
+        let rows = padded(self.n);
+        let at = |axis: usize| self.all[axis * rows + k];
+        [at(0), at(1), at(2), at(3), at(4), at(5)]
+    }
+
+    /// Those of an axis from number `from` on, many at a time.
+    #[inline(always)]
+    fn axis(&self, axis: usize, from: usize) -> &[[f64; WIDTH]] {
+        let rows = padded(self.n);
+        self.all[axis * rows + from..(axis + 1) * rows]
+            .as_chunks()
+            .0
     }
 }
 
@@ -71,7 +100,8 @@ impl Noise {
 /// So much of the noise of images of one datum is in common: what is left keeps a system apart from singular.
 const IN_COMMON: f64 = 0.999;
 
-/// The covariances of places with each other, over the variance of the process: the lower half of K, column by column.
+/// The covariances of places with each other, over the variance of the process: the lower half of K, column by column,
+/// each from a multiple of [`WIDTH`] on to the next one beyond its end.
 pub(super) struct Correlations {
     n: usize,
     k: Vec<f64>,
@@ -80,7 +110,7 @@ pub(super) struct Correlations {
 impl Correlations {
     pub fn new(arch: Arch, at: &Axes, covariance: Covariance) -> Self {
         let n = at.len();
-        let mut k = vec![0.0; n * n];
+        let mut k = vec![0.0; n * padded(n)];
         arch.dispatch(Filled {
             k: &mut k,
             at,
@@ -92,18 +122,23 @@ impl Correlations {
     /// The factor of `K + nugget · noise`; `None` where that is singular to this precision.
     pub fn factor(&self, arch: Arch, nugget: f64, noise: &Noise) -> Option<Factor> {
         let mut l = self.k.clone();
-        for (j, variance) in noise.variances.iter().enumerate() {
-            l[j * (self.n + 1)] = 1.0 + nugget * variance;
-        }
-        for (i, j) in &noise.same {
-            l[i * self.n + j] += IN_COMMON * nugget * noise.variances[*i];
-        }
+        add_noise(self.n, &mut l, nugget, noise);
         arch.dispatch(Factored(self.n, &mut l))
             .then_some(Factor { n: self.n, l })
     }
 }
 
-/// A lower factor L, column by column, each as long as the whole.
+fn add_noise(n: usize, k: &mut [f64], nugget: f64, noise: &Noise) {
+    for (j, variance) in noise.variances.iter().enumerate() {
+        k[j * padded(n) + j] = 1.0 + nugget * variance;
+    }
+    for (i, j) in &noise.same {
+        k[i * padded(n) + j] += IN_COMMON * nugget * noise.variances[*i];
+    }
+}
+
+/// A lower factor L, column by column, each as long as the whole and up to a multiple of [`WIDTH`]; zero above the
+/// diagonal.
 pub(super) struct Factor {
     n: usize,
     l: Vec<f64>,
@@ -112,7 +147,7 @@ pub(super) struct Factor {
 impl Factor {
     /// That of `L Lᵀ`.
     pub fn log_determinant(&self) -> f64 {
-        let pivots = (0..self.n).map(|j| self.l[j * (self.n + 1)].natural_log());
+        let pivots = (0..self.n).map(|j| self.l[j * padded(self.n) + j].natural_log());
         2.0 * pivots.sum::<f64>()
     }
 
@@ -135,13 +170,14 @@ pub(super) fn covariances(
     place: &Pair,
     k: &mut Vec<f64>,
 ) {
-    k.resize(at.len(), 0.0);
+    k.resize(padded(at.len()), 0.0);
     arch.dispatch(Covariances {
         at,
         covariance,
         place,
         k,
     });
+    k.truncate(at.len());
 }
 
 /// Σ a b.
@@ -206,9 +242,11 @@ impl WithSimd for Filled<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let n = self.at.len();
+        let rows = padded(n);
         for j in 0..n {
-            let column = &mut self.k[j * n + j..(j + 1) * n];
-            fill_column(self.at, j, self.covariance, &self.at.place(j), column);
+            let from = j / WIDTH * WIDTH;
+            let column = &mut self.k[j * rows + from..(j + 1) * rows];
+            fill_column(self.at, from, self.covariance, &self.at.place(j), column);
         }
     }
 }
@@ -219,39 +257,134 @@ impl WithSimd for Factored<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> bool {
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
         let Self(n, l) = self;
-        for j in 0..n {
-            let (done, rest) = l.split_at_mut(j * n);
-            let column = &mut rest[j..n];
-            let mut k = 0;
-            while k + 4 <= j {
-                let c0 = &done[k * n + j..][..n - j];
-                let c1 = &done[(k + 1) * n + j..][..n - j];
-                let c2 = &done[(k + 2) * n + j..][..n - j];
-                let c3 = &done[(k + 3) * n + j..][..n - j];
-                let (a0, a1, a2, a3) = (c0[0], c1[0], c2[0], c3[0]);
-                for i in 0..n - j {
-                    column[i] -= (a0 * c0[i] + a1 * c1[i]) + (a2 * c2[i] + a3 * c3[i]);
+        let rows = padded(n);
+        for j in (0..n).step_by(PANEL) {
+            let (done, rest) = l.split_at_mut(j * rows);
+            let panel = &mut rest[..PANEL.min(n - j) * rows];
+            let from = j / WIDTH * WIDTH;
+            for four in done.chunks_exact(PANEL * rows) {
+                let c = columns(four, rows);
+                let numbers = |row: usize| [c[0][row], c[1][row], c[2][row], c[3][row]];
+                let c = [&c[0][from..], &c[1][from..], &c[2][from..], &c[3][from..]];
+                if panel.len() == PANEL * rows {
+                    let a = [numbers(j), numbers(j + 1), numbers(j + 2), numbers(j + 3)];
+                    subtract_four_of_four(simd, columns_mut(panel, rows, from), c, a);
+                } else {
+                    for (w, column) in panel.chunks_exact_mut(rows).enumerate() {
+                        subtract_four(simd, &mut column[from..], c, numbers(j + w));
+                    }
                 }
-                k += 4;
             }
-            while k < j {
-                let c = &done[k * n + j..][..n - j];
-                subtract(column, c, c[0]);
-                k += 1;
-            }
-            let pivot = column[0];
-            if pivot.is_nan() || pivot <= 1e-12 {
+            if !factor_panel(simd, panel, j, rows) {
                 return false;
-            }
-            let root = 1.0 / pivot.sqrt();
-            for x in column.iter_mut() {
-                *x *= root;
             }
         }
         true
     }
+}
+
+/// The first four columns.
+#[inline(always)]
+fn columns(all: &[f64], rows: usize) -> [&[f64]; PANEL] {
+    let (first, rest) = all.split_at(rows);
+    let (second, rest) = rest.split_at(rows);
+    let (third, rest) = rest.split_at(rows);
+    [first, second, third, &rest[..rows]]
+}
+
+/// The first four columns from a row on.
+#[inline(always)]
+fn columns_mut(all: &mut [f64], rows: usize, from: usize) -> [&mut [f64]; PANEL] {
+    let (first, rest) = all.split_at_mut(rows);
+    let (second, rest) = rest.split_at_mut(rows);
+    let (third, rest) = rest.split_at_mut(rows);
+    [
+        &mut first[from..],
+        &mut second[from..],
+        &mut third[from..],
+        &mut rest[from..rows],
+    ]
+}
+
+/// `x −= a₀ c₀ + a₁ c₁ + a₂ c₂ + a₃ c₃`, of full registers.
+#[inline(always)]
+fn subtract_four<S: Simd>(simd: S, x: &mut [f64], c: [&[f64]; PANEL], a: [f64; PANEL]) {
+    let [c0, c1, c2, c3] = c;
+    let a = [
+        simd.splat_f64s(a[0]),
+        simd.splat_f64s(a[1]),
+        simd.splat_f64s(a[2]),
+        simd.splat_f64s(a[3]),
+    ];
+    let (c0, c1) = (S::as_simd_f64s(c0).0, S::as_simd_f64s(c1).0);
+    let (c2, c3) = (S::as_simd_f64s(c2).0, S::as_simd_f64s(c3).0);
+    let x = S::as_mut_simd_f64s(x).0;
+    for ((((x, c0), c1), c2), c3) in x.iter_mut().zip(c0).zip(c1).zip(c2).zip(c3) {
+        *x = less_four(simd, *x, [*c0, *c1, *c2, *c3], a);
+    }
+}
+
+/// The same of four columns at a time, which share the `c`.
+#[inline(always)]
+fn subtract_four_of_four<S: Simd>(
+    simd: S,
+    x: [&mut [f64]; PANEL],
+    c: [&[f64]; PANEL],
+    a: [[f64; PANEL]; PANEL],
+) {
+    let mut all = [[simd.splat_f64s(0.0); PANEL]; PANEL];
+    for (all, a) in all.iter_mut().zip(&a) {
+        for (all, a) in all.iter_mut().zip(a) {
+            *all = simd.splat_f64s(*a);
+        }
+    }
+    let [x0, x1, x2, x3] = x;
+    let [c0, c1, c2, c3] = c;
+    let (x0, x1) = (S::as_mut_simd_f64s(x0).0, S::as_mut_simd_f64s(x1).0);
+    let (x2, x3) = (S::as_mut_simd_f64s(x2).0, S::as_mut_simd_f64s(x3).0);
+    let (c0, c1) = (S::as_simd_f64s(c0).0, S::as_simd_f64s(c1).0);
+    let (c2, c3) = (S::as_simd_f64s(c2).0, S::as_simd_f64s(c3).0);
+    let x = x0.iter_mut().zip(x1).zip(x2).zip(x3);
+    let c = c0.iter().zip(c1).zip(c2).zip(c3);
+    for ((((x0, x1), x2), x3), (((c0, c1), c2), c3)) in x.zip(c) {
+        let c = [*c0, *c1, *c2, *c3];
+        *x0 = less_four(simd, *x0, c, all[0]);
+        *x1 = less_four(simd, *x1, c, all[1]);
+        *x2 = less_four(simd, *x2, c, all[2]);
+        *x3 = less_four(simd, *x3, c, all[3]);
+    }
+}
+
+#[inline(always)]
+fn less_four<S: Simd>(simd: S, x: S::f64s, c: [S::f64s; 4], a: [S::f64s; 4]) -> S::f64s {
+    let first = simd.add_f64s(simd.mul_f64s(a[0], c[0]), simd.mul_f64s(a[1], c[1]));
+    let second = simd.add_f64s(simd.mul_f64s(a[2], c[2]), simd.mul_f64s(a[3], c[3]));
+    simd.sub_f64s(x, simd.add_f64s(first, second))
+}
+
+/// Factors up to [`PANEL`] columns, the first of which begins at row `j`; `false` where they are singular.
+#[inline(always)]
+fn factor_panel<S: Simd>(simd: S, panel: &mut [f64], j: usize, rows: usize) -> bool {
+    let start = j / WIDTH * WIDTH;
+    for w in 0..panel.len() / rows {
+        let (before, column) = panel.split_at_mut(w * rows);
+        let column = &mut column[..rows];
+        for done in before.chunks_exact(rows) {
+            subtract(simd, &mut column[start..], &done[start..], done[j + w]);
+        }
+        let pivot = column[j + w];
+        if pivot.is_nan() || pivot <= 1e-12 {
+            return false;
+        }
+        let root = simd.splat_f64s(1.0 / pivot.sqrt());
+        column[start..j + w].fill(0.0);
+        for x in S::as_mut_simd_f64s(&mut column[start..]).0 {
+            *x = simd.mul_f64s(*x, root);
+        }
+    }
+    true
 }
 
 struct Forward<'a>(&'a Factor, &'a mut [f64]);
@@ -260,13 +393,15 @@ impl WithSimd for Forward<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self(Factor { n, l }, x) = self;
-        for j in 0..*n {
-            let column = &l[j * n + j..(j + 1) * n];
-            let (first, rest) = x[j..].split_at_mut(1);
-            first[0] /= column[0];
-            subtract(rest, &column[1..], first[0]);
+        let rows = padded(*n);
+        for (j, column) in l.chunks_exact(rows).enumerate() {
+            let first = x[j] / column[j];
+            // What is above the diagonal is zero.
+            let from = j / WIDTH * WIDTH;
+            subtract(simd, &mut x[from..], &column[from..*n], first);
+            x[j] = first;
         }
     }
 }
@@ -279,8 +414,9 @@ impl WithSimd for Backward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self(Factor { n, l }, x) = self;
+        let rows = padded(*n);
         for j in (0..*n).rev() {
-            let column = &l[j * n + j..(j + 1) * n];
+            let column = &l[j * rows + j..j * rows + n];
             let below = sum_of_products(&column[1..], &x[j + 1..]);
             x[j] = (x[j] - below) / column[0];
         }
@@ -289,8 +425,14 @@ impl WithSimd for Backward<'_> {
 
 /// `x −= a c`.
 #[inline(always)]
-fn subtract(x: &mut [f64], c: &[f64], a: f64) {
-    for (x, c) in x.iter_mut().zip(c) {
+fn subtract<S: Simd>(simd: S, x: &mut [f64], c: &[f64], a: f64) {
+    let (wide_x, rest_x) = S::as_mut_simd_f64s(x);
+    let (wide_c, rest_c) = S::as_simd_f64s(c);
+    let wide_a = simd.splat_f64s(a);
+    for (x, c) in wide_x.iter_mut().zip(wide_c) {
+        *x = simd.sub_f64s(*x, simd.mul_f64s(wide_a, *c));
+    }
+    for (x, c) in rest_x.iter_mut().zip(rest_c) {
         *x -= a * c;
     }
 }
@@ -319,67 +461,54 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
     sums[0] + rest
 }
 
-/// The covariances of a place with those from number `from` on.
+/// The covariances of a place with those from number `from` on, a multiple of [`WIDTH`] of them.
 #[inline(always)]
 fn fill_column(at: &Axes, from: usize, covariance: Covariance, place: &Pair, column: &mut [f64]) {
-    let n = column.len();
-    let x = &at.axes[0][from..][..n];
-    let y = &at.axes[1][from..][..n];
-    let z = &at.axes[2][from..][..n];
-    let u = &at.axes[3][from..][..n];
-    let v = &at.axes[4][from..][..n];
-    let w = &at.axes[5][from..][..n];
     let scale = covariance.scale;
-    // The choice stands outside of the loops, which are the same but for the factor.
-    match covariance.kernel {
-        ScatteredKernel::Exponential => {
-            for i in 0..n {
-                let place_i = [x[i], y[i], z[i], u[i], v[i], w[i]];
-                column[i] = decay(scale * distance2(&place_i, place).sqrt());
-            }
+    let planar = at.axis(0, from).iter().zip(at.axis(1, from));
+    let upright = at.axis(2, from).iter().zip(at.axis(3, from));
+    let others = at.axis(4, from).iter().zip(at.axis(5, from));
+    let (columns, _) = column.as_chunks_mut::<WIDTH>();
+    for (((out, (x, y)), (z, u)), (v, w)) in columns.iter_mut().zip(planar).zip(upright).zip(others)
+    {
+        let mut s = [0.0; WIDTH];
+        for i in 0..WIDTH {
+            let (dx, dy) = (x[i] - place[0], y[i] - place[1]);
+            let (dz, du) = (z[i] - place[2], u[i] - place[3]);
+            let (dv, dw) = (v[i] - place[4], w[i] - place[5]);
+            let squares = (dx * dx + dy * dy) + (dz * dz + du * du) + (dv * dv + dw * dw);
+            s[i] = scale * squares.sqrt();
         }
-        ScatteredKernel::Matern32 => {
-            for i in 0..n {
-                let place_i = [x[i], y[i], z[i], u[i], v[i], w[i]];
-                let s = scale * distance2(&place_i, place).sqrt();
-                column[i] = (1.0 + s) * decay(s);
+        for i in 0..WIDTH {
+            out[i] = decay(s[i]);
+        }
+        if covariance.kernel == ScatteredKernel::Matern32 {
+            for i in 0..WIDTH {
+                out[i] *= 1.0 + s[i];
             }
         }
     }
-}
-
-#[inline(always)]
-fn distance2(a: &Pair, b: &Pair) -> f64 {
-    let d = [
-        a[0] - b[0],
-        a[1] - b[1],
-        a[2] - b[2],
-        a[3] - b[3],
-        a[4] - b[4],
-        a[5] - b[5],
-    ];
-    (d[0] * d[0] + d[1] * d[1]) + (d[2] * d[2] + d[3] * d[3]) + (d[4] * d[4] + d[5] * d[5])
 }
 
 /// What is added to this is rounded to a whole number, which stands in the low bits.
 const WHOLE: f64 = 6_755_399_441_055_744.0;
 /// ln 2 in two parts, the first short enough that its products with whole numbers up to 1010 are exact.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-/// 1 / k! from k = 12 down: within ±ln 2 / 2 the next term is below 2e-16.
+/// 1 / k! up to k = 12: within ±ln 2 / 2 the next term is below 2e-16.
 const TAYLOR: [f64; 13] = [
-    1.0 / 479_001_600.0,
-    1.0 / 39_916_800.0,
-    1.0 / 3_628_800.0,
-    1.0 / 362_880.0,
-    1.0 / 40_320.0,
-    1.0 / 5040.0,
-    1.0 / 720.0,
-    1.0 / 120.0,
-    1.0 / 24.0,
-    1.0 / 6.0,
+    1.0,
+    1.0,
     0.5,
-    1.0,
-    1.0,
+    1.0 / 6.0,
+    1.0 / 24.0,
+    1.0 / 120.0,
+    1.0 / 720.0,
+    1.0 / 5040.0,
+    1.0 / 40_320.0,
+    1.0 / 362_880.0,
+    1.0 / 3_628_800.0,
+    1.0 / 39_916_800.0,
+    1.0 / 479_001_600.0,
 ];
 
 /// e⁻ˢ.
@@ -396,10 +525,13 @@ fn exponential(x: f64) -> f64 {
     let shifted = x * std::f64::consts::LOG2_E + WHOLE;
     let halvings = shifted - WHOLE;
     let x = (x - halvings * LN_2[0]) - halvings * LN_2[1];
-    let mut e = TAYLOR[0];
-    for coefficient in &TAYLOR[1..] {
-        e = e * x + coefficient;
-    }
+    // Estrin's scheme: few products wait for each other.
+    let c = &TAYLOR;
+    let (x2, first) = (x * x, c[0] + c[1] * x);
+    let x4 = x2 * x2;
+    let low = (first + (c[2] + c[3] * x) * x2) + ((c[4] + c[5] * x) + (c[6] + c[7] * x) * x2) * x4;
+    let high = ((c[8] + c[9] * x) + (c[10] + c[11] * x) * x2) + c[12] * x4;
+    let e = low + high * (x4 * x4);
     // The whole number becomes an exponent.
     let exponent = shifted.to_bits().wrapping_sub(WHOLE.to_bits());
     e * f64::from_bits(exponent.wrapping_add(1023) << 52)
@@ -459,19 +591,14 @@ mod tests {
                     let back = dot(Arch::new(), &k, &x);
                     assert!((back - y[i]).abs() < 1e-8, "{n} {i}: {back} {}", y[i]);
                 }
-                let mut narrow = vec![0.0; n * n];
+                let mut narrow = vec![0.0; n * padded(n)];
                 let filled = Filled {
                     k: &mut narrow,
                     at: &at,
                     covariance,
                 };
                 filled.with_simd(pulp::Scalar);
-                for (j, noise) in noise.variances.iter().enumerate() {
-                    narrow[j * (n + 1)] = 1.0 + 1e-3 * noise;
-                }
-                for (i, j) in &noise.same {
-                    narrow[i * n + j] += IN_COMMON * 1e-3 * noise.variances[*i];
-                }
+                add_noise(n, &mut narrow, 1e-3, &noise);
                 assert!(Factored(n, &mut narrow).with_simd(pulp::Scalar));
                 assert!(narrow == factor.l);
             }

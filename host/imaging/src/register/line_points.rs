@@ -51,8 +51,10 @@ impl Registrar {
                 (strips, fit)
             }
             Search::Far | Search::About => {
-                let (within_widths, trust) = loose(search, width);
-                let found = self.elsewhere(&shot, &predicted, within_widths, (&trust, &|all| all));
+                let (windows, trust) = loose(search, width);
+                let found = windows.iter().find_map(|widths| {
+                    self.elsewhere(&shot, &predicted, *widths, (&trust, &|all| all))
+                });
                 let Some(Elsewhere { strips, fit, .. }) = found else {
                     return Vec::new();
                 };
@@ -79,7 +81,7 @@ impl Registrar {
 }
 
 /// How far to look, and how far a camera may be from what the rig says.
-fn loose(search: Search, width: f64) -> (f64, Trust) {
+fn loose(search: Search, width: f64) -> (&'static [f64], Trust) {
     let is_far = search == Search::Far;
     let pick = |far: f64, about: f64| if is_far { far } else { about };
     let trust = Trust {
@@ -90,5 +92,11 @@ fn loose(search: Search, width: f64) -> (f64, Trust) {
         model_px: (pick(1e-3, 5e-4) * width).max(5.0 * MODEL_PX),
         ln_scale: pick(0.05, 0.01),
     };
-    (pick(0.15, 0.03), trust)
+    // At oblique views a wide neighbourhood of a line holds the one opposite too.
+    let windows: &[f64] = if is_far {
+        &[0.15, 0.08, 0.045]
+    } else {
+        &[0.03]
+    };
+    (windows, trust)
 }

@@ -1,8 +1,10 @@
 //! The light from the shading on the reference.
 
+use crate::calibrate::camera::{are_free, covariance_of, priors, started, states};
 use crate::calibrate::error::CalibrateError;
+use crate::calibrate::median;
 use crate::calibrate::mirror::{self, MirrorLight};
-use crate::calibrate::numbers::{LightSolution, allow_for_kept};
+use crate::calibrate::numbers::{Alternatives, LightSolution, among_all};
 use crate::calibrate::residuals::ShadingResidual;
 use crate::calibrate::shading::{
     LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, MirrorTerm, OWN, ReferenceShape, ShadedFrame,
@@ -10,7 +12,6 @@ use crate::calibrate::shading::{
 };
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
-use crate::calibrate::{are_free, covariance_of, median, priors, started, states};
 use gonia_rig::{Remark, Rig};
 use nalgebra::DMatrix;
 
@@ -149,19 +150,24 @@ impl Light {
         if let Some(unlike) = unlike(&all, typical) {
             return known.by_mirror_or(rig, unlike);
         }
-        let mut covariance = joined(known.camera, &all.information, &prior)?;
-        let (light, own) = (LIGHT.len(), own_of(&covariance));
+        let light = LIGHT.len();
+        let full = joined(known.camera, &all, &prior, &everything)?;
         let (was, likely) = (&nominal[..light], &prior[..light]);
-        let states = states(&LIGHT, rig, was, likely, &all.shared, &own);
-        let at = CAMERA.len();
-        allow_for_kept(&mut covariance, at, &states, &nominal, &all.shared);
-        let kept = free(&are_free(&LIGHT, &states), prior.len());
+        let states = states(&LIGHT, rig, was, likely, &all.shared, &own_of(&full));
+        let moves = are_free(&LIGHT, &states);
+        let kept = free(&moves, prior.len());
         let solved = solve_light(
             &shading,
             &nominal,
             &prior,
             &kept,
             (Some(&all.own), Some(&all)),
+        )?;
+        let covariance = about_kept(
+            (&nominal, &prior),
+            &moves,
+            (&all, &full),
+            (&solved, &joined(known.camera, &solved, &prior, &kept)?),
         )?;
         // What the light was thought to be, with the intensity and the reference that fit it best.
         let held = free(&[false; LIGHT.len()], prior.len());
@@ -298,36 +304,71 @@ pub fn solve_light(
     solve(shading, &problem, &start).ok_or(CalibrateError::NoSolution)
 }
 
-/// The covariance of camera, target and light together. With N the information of shading and l, t the
-/// numbers of light (with intensity and reference) and target, l follows a change of t by G = −N_ll⁻¹ N_lt.
+/// The covariance of camera and light about a light of which some numbers are held: `all` is the solution where none
+/// is, `kept` that where only those move that `moves` says.
+fn about_kept(
+    (nominal, prior): (&[f64], &[f64]),
+    moves: &[bool],
+    (all, full): (&Solved, &DMatrix<f64>),
+    (kept, known): (&Solved, &DMatrix<f64>),
+) -> Result<DMatrix<f64>, CalibrateError> {
+    let (camera, light) = (CAMERA.len(), LIGHT.len());
+    // Shading does not change the camera.
+    let behind_camera = |of: &[f64]| [&vec![0.0; camera], &of[..light]].concat();
+    let held: Vec<usize> = (0..light)
+        .filter(|k| !moves[*k])
+        .map(|k| camera + k)
+        .collect();
+    let alternatives = Alternatives {
+        held: &held,
+        nominal: &behind_camera(nominal),
+        prior: &behind_camera(prior),
+        free: (&behind_camera(&all.shared), full),
+        kept: (&behind_camera(&kept.shared), known),
+    };
+    let covariance = alternatives.covariance();
+    covariance.ok_or(CalibrateError::NoSolution)
+}
+
+/// The covariance of camera, target and light together, of a light whose numbers are known where they are not
+/// `free`. With N the information of shading and l, t the numbers of light (with intensity and reference) and
+/// target, l follows a change of t by G = −N_ll⁻¹ N_lt.
 fn joined(
     camera: &DMatrix<f64>,
-    information: &DMatrix<f64>,
+    solved: &Solved,
     prior: &[f64],
+    free: &[bool],
 ) -> Result<DMatrix<f64>, CalibrateError> {
-    let light: Vec<usize> = (0..LIGHT.len()).chain(LN_INTENSITY..prior.len()).collect();
-    let pick = |of: &[usize]| {
-        DMatrix::from_fn(light.len(), of.len(), |i, j| information[(light[i], of[j])])
-    };
-    let light_prior: Vec<f64> = light.iter().map(|i| prior[*i]).collect();
-    let own = covariance_of(&pick(&light), &light_prior)?;
+    let all = 0..prior.len();
+    let is_target = |k: usize| (LIGHT.len()..LN_INTENSITY).contains(&k);
+    let some: Vec<usize> = all.filter(|k| free[*k] && !is_target(*k)).collect();
+    let information = &solved.information;
+    let pick =
+        |of: &[usize]| DMatrix::from_fn(some.len(), of.len(), |i, j| information[(some[i], of[j])]);
+    let some_prior: Vec<f64> = some.iter().map(|i| prior[*i]).collect();
+    let bread = covariance_of(&pick(&some), &some_prior)?;
+    let own = solved.covariance(prior, &some);
+    let own = own.ok_or(CalibrateError::NoSolution)?;
     let target: Vec<usize> = (LIGHT.len()..LIGHT.len() + TARGET).collect();
-    let follows = -&own * pick(&target);
+    let follows = -bread * pick(&target);
+    let of_light = some.iter().filter(|k| **k < LIGHT.len()).count();
+    let places: Vec<usize> = some[..of_light].to_vec();
     let (n, l) = (CAMERA.len(), LIGHT.len());
     let target_rows = camera.rows(n - TARGET, TARGET).into_owned();
     let across = &follows * &target_rows;
     let target_alone = target_rows.columns(n - TARGET, TARGET).into_owned();
     let light_alone = own + &follows * target_alone * follows.transpose();
+    let light_alone = light_alone.view((0, 0), (of_light, of_light)).into_owned();
     let mut joined = DMatrix::zeros(n + l, n + l);
     joined.view_mut((0, 0), (n, n)).copy_from(camera);
     joined
         .view_mut((n, n), (l, l))
-        .copy_from(&light_alone.view((0, 0), (l, l)));
-    joined
-        .view_mut((n, 0), (l, n))
-        .copy_from(&across.rows(0, l));
-    joined
-        .view_mut((0, n), (n, l))
-        .copy_from(&across.rows(0, l).transpose());
+        .copy_from(&among_all(l, &places, &light_alone));
+    for (i, place) in places.iter().enumerate() {
+        for k in 0..n {
+            joined[(n + place, k)] = across[(i, k)];
+            joined[(k, n + place)] = across[(i, k)];
+        }
+    }
     Ok(joined)
 }

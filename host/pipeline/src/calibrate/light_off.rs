@@ -1,12 +1,13 @@
 //! How far a rig's light is from where the shading on a known reference puts it.
 
+use crate::calibrate::camera::covariance_of;
 use crate::calibrate::light::{nominal, solve_light, unlike, with_target};
+use crate::calibrate::median;
 use crate::calibrate::numbers::{Spread, changes, direction_u};
 use crate::calibrate::shading::{
     ReferenceShape, ShadedFrame, Shading, ln_intensity, target_unknowns, thin,
 };
 use crate::calibrate::unknowns::{LIGHT, TARGET, with_values};
-use crate::calibrate::{covariance_of, median};
 use gonia_brdf::Pose;
 use gonia_rig::Rig;
 

@@ -5,12 +5,12 @@
 //! tilt are found as well. Camera, camera arm and target come from the lines; their uncertainty is carried
 //! over.
 
+use crate::calibrate::camera::{are_free, covariance_of, priors, started};
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::lines::{LineFrame, arm_offset};
-use crate::calibrate::numbers::{LightSolution, NumberState, allow_for_kept};
+use crate::calibrate::numbers::{LightSolution, NumberState};
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, values, with_values};
-use crate::calibrate::{are_free, covariance_of, priors, started};
 use gonia_brdf::direction::{Vec3, dot, normalize};
 use gonia_brdf::{Direction, Elementary};
 use gonia_imaging::Highlight;
@@ -157,12 +157,10 @@ impl<'a> MirrorLight<'a> {
         camera: &DMatrix<f64>,
         states: impl FnOnce(&[f64], &DMatrix<f64>) -> Vec<NumberState>,
     ) -> Result<LightSolution, CalibrateError> {
-        let mut covariance = joined(&self.solved.information, &self.prior, camera)?;
+        let covariance = joined(&self.solved.information, &self.prior, camera)?;
         let (n, l) = (CAMERA.len(), LIGHT.len());
         let own = covariance.view((n, n), (l, l)).into_owned();
-        let (was, found) = (&self.nominal[..l], &self.solved.shared[..l]);
-        let states = states(found, &own);
-        allow_for_kept(&mut covariance, n, &states, was, found);
+        let states = states(&self.solved.shared[..l], &own);
         let free = are_free(&LIGHT[..PLACE], &states[..PLACE]);
         let priors = (&self.nominal[..], &self.prior[..]);
         let start = started(&self.nominal, &all_free(&free), Some(&self.solved));

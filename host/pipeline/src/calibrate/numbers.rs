@@ -1,8 +1,8 @@
 //! What became of each number, and what all of them together mean for directions.
 
 use crate::calibrate::unknowns::{Moves, Unknown, with_values};
-use gonia_brdf::Pose;
 use gonia_brdf::direction::{Vec3, angle_between};
+use gonia_brdf::{Elementary, Pose};
 use gonia_rig::{CameraModel, CameraShift, Rig};
 use nalgebra::{DMatrix, DVector};
 
@@ -70,8 +70,7 @@ pub fn state_of(
     }
     // The Savage-Dickey ratio: twice the logarithm of the Bayes factor for a number that differs from
     // the rig's against one that does not.
-    let speaks =
-        ((value - nominal) / u).powi(2) - 2.0 * gonia_brdf::Elementary::natural_log(prior / u);
+    let speaks = ((value - nominal) / u).powi(2) - 2.0 * (prior / u).natural_log();
     match unknown.moves {
         Moves::WhenNeeded(least) if speaks < 0.0 || (value - nominal).abs() < least(rig) => {
             NumberState::NotNeeded
@@ -80,20 +79,58 @@ pub fn state_of(
     }
 }
 
-/// Numbers that were free to move and are kept at the rig's value, although the frames do not need that: to their
-/// variances comes how far off the frames see them. `first` is the row of the first number in `covariance`.
-pub fn allow_for_kept(
-    covariance: &mut DMatrix<f64>,
-    first: usize,
-    states: &[NumberState],
-    nominal: &[f64],
-    found: &[f64],
-) {
-    for (k, state) in states.iter().enumerate() {
-        if *state == NumberState::NotNeeded {
-            covariance[(first + k, first + k)] += (found[k] - nominal[k]).powi(2);
+/// Numbers with some of them free and with those held at the rig's values.
+pub struct Alternatives<'a> {
+    /// The numbers that are held in the second case.
+    pub held: &'a [usize],
+    /// The rig's values.
+    pub nominal: &'a [f64],
+    /// Prior standard deviations.
+    pub prior: &'a [f64],
+    /// Values where all are free, and their covariance.
+    pub free: (&'a [f64], &'a DMatrix<f64>),
+    /// Values where some are held, and their covariance: nothing for those.
+    pub kept: (&'a [f64], &'a DMatrix<f64>),
+}
+
+impl Alternatives<'_> {
+    /// The covariance about the values with some held: both cases may be true, and what is true of one is as far
+    /// from the other's values as the two are apart. Their odds are those of the frames (the Savage-Dickey ratio
+    /// of all held numbers together), equal before.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let (found, full) = self.free;
+        let (at, known) = self.kept;
+        if self.held.is_empty() {
+            return Some(full.clone());
+        }
+        let n = self.held.len();
+        let prior = |i: usize| self.prior[self.held[i]];
+        let off = DVector::from_fn(n, |i, _| {
+            (found[self.held[i]] - self.nominal[self.held[i]]) / prior(i)
+        });
+        let own = DMatrix::from_fn(n, n, |i, j| {
+            full[(self.held[i], self.held[j])] / (prior(i) * prior(j))
+        });
+        let factor = own.cholesky()?;
+        let ln_determinant: f64 = (factor.l_dirty().diagonal().iter())
+            .map(|root| 2.0 * root.natural_log())
+            .sum();
+        let speaks = off.dot(&factor.solve(&off)) + ln_determinant;
+        let share = 1.0 / (1.0 + (-0.5 * speaks).clamp(-50.0, 50.0).exponential());
+        let apart = DVector::from_fn(found.len(), |k, _| found[k] - at[k]);
+        Some(known * (1.0 - share) + (full + &apart * apart.transpose()) * share)
+    }
+}
+
+/// A covariance of some numbers among all, of which the others are known.
+pub fn among_all(all: usize, some: &[usize], covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut whole = DMatrix::zeros(all, all);
+    for (i, k) in some.iter().enumerate() {
+        for (j, l) in some.iter().enumerate() {
+            whole[(*k, *l)] = covariance[(i, j)];
         }
     }
+    whole
 }
 
 /// Unit vectors towards light and camera, as an arm's reading and a rig have them.

@@ -312,6 +312,11 @@ impl Frames for Shading<'_> {
         self.frames.len() + usize::from(self.mirror.is_some())
     }
 
+    /// One mirror's term says nothing of how such terms scatter.
+    fn is_known(&self, frame: usize) -> bool {
+        frame >= self.frames.len()
+    }
+
     fn at(&self, shared: &[f64]) -> (Rig, Vec<f64>) {
         let (light, target) = shared.split_at(LIGHT.len());
         let rig = with_values(&LIGHT, self.rig, light);

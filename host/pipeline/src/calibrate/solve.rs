@@ -36,6 +36,11 @@ pub trait Frames: Sync {
 
     /// Residuals of a frame, in standard deviations of their noise up to a common factor; always as many.
     fn residuals(&self, at: &Self::At, frame: usize, own: &[f64]) -> Vec<f64>;
+
+    /// Whether a frame's residuals scatter as they are known to: then nothing is learnt from how far off it is.
+    fn is_known(&self, _frame: usize) -> bool {
+        false
+    }
 }
 
 /// A problem: where numbers start, and how far they may be from there.
@@ -68,6 +73,46 @@ pub struct Solved {
     pub own: Vec<f64>,
     /// The residuals' common factor.
     pub noise: f64,
+    /// What each frame pulls, and how much it knows, in units of the priors.
+    pulls: Vec<Pull>,
+}
+
+/// A frame's part in a solution.
+#[derive(Clone, Debug)]
+struct Pull {
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Whether its residuals are what they are known to be.
+    is_known: bool,
+}
+
+impl Solved {
+    /// The covariance of the numbers `among`, where the others are known: by how the solution scatters when frames
+    /// are left out one by one. What is common to the residuals of a frame, modelled or not, is in it
+    /// (the cluster-robust estimate CR3: Bell and McCaffrey 2002). To that comes what the priors' own
+    /// uncertainty leaves. `None` where there is none.
+    pub fn covariance(&self, prior: &[f64], among: &[usize]) -> Option<DMatrix<f64>> {
+        let n = among.len();
+        let of = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(among[i], among[j])]);
+        let normals: Vec<DMatrix<f64>> = self.pulls.iter().map(|pull| of(&pull.normal)).collect();
+        let mut all = DMatrix::identity(n, n);
+        normals.iter().for_each(|normal| all += normal);
+        let inverse = all.clone().cholesky()?.inverse();
+        let mut scatter = DMatrix::zeros(n, n);
+        for (pull, normal) in self.pulls.iter().zip(&normals) {
+            if pull.is_known {
+                scatter += &inverse * normal * &inverse;
+                continue;
+            }
+            let right = DVector::from_fn(n, |i, _| pull.right[among[i]]);
+            // Without this frame the solution would be so far from where it is.
+            let step = (&all - normal).cholesky()?.solve(&right);
+            scatter += &step * step.transpose();
+        }
+        let sum = scatter + &inverse * &inverse;
+        let scaled = |i: usize, j: usize| sum[(i, j)] * prior[among[i]] * prior[among[j]];
+        Some(DMatrix::from_fn(n, n, scaled))
+    }
 }
 
 /// The normal equations of one frame, without its own numbers.
@@ -154,6 +199,15 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
         information,
         own: own_sd,
         noise,
+        pulls: reduced
+            .into_iter()
+            .enumerate()
+            .map(|(f, Reduced { normal, right, .. })| Pull {
+                normal,
+                right,
+                is_known: frames.is_known(f),
+            })
+            .collect(),
     })
 }
 
@@ -315,7 +369,7 @@ mod tests {
             let solved = solve(&Lines { seen }, &problem, &[0.0, 0.0]).unwrap();
             assert!((solved.own[0] / 0.5 - 1.0).abs() < 0.5, "{:?}", solved.own);
             assert!((solved.noise / 0.5 - 1.0).abs() < 0.2, "{}", solved.noise);
-            let covariance = solved.information.try_inverse().unwrap();
+            let covariance = solved.covariance(problem.prior, &[0, 1]).unwrap();
             for (k, truth) in [3.0, -0.2].into_iter().enumerate() {
                 let u = covariance[(k, k)].sqrt();
                 within[k] += usize::from((solved.shared[k] - truth).abs() < 2.0 * u);

@@ -21,6 +21,16 @@ pub(crate) fn remarks(fit: &ScatteredFit) -> Vec<Remark> {
             "leave --symmetry out, or give none",
         ));
     }
+    if choice.plane_undetermined {
+        remarks.push(Remark::new(
+            SAMPLES,
+            format_args!(
+                "lie too rarely on both sides of any plane to find the azimuth of the one that was asked for: none is taken, the symmetry is {}",
+                choice.settings.symmetry
+            ),
+            "measure other azimuths of light and view",
+        ));
+    }
     if choice.log_error.is_none() {
         let (assumed, remedy) = match choice.reason {
             Reason::TooFew => (

@@ -59,7 +59,9 @@ impl Prepared {
         let fit = fit.filter(|fit| {
             let is_few = fit.places() <= FEW_ANISOTROPIC && !options.asks_for_blocks();
             let takes_place = symmetry.is_isotropic() || is_few;
-            if takes_place || fit.choice().contradicted_by.is_some() {
+            let choice = fit.choice();
+            let is_odd = choice.contradicted_by.is_some() || choice.plane_undetermined;
+            if takes_place || is_odd {
                 remarks.extend(doubts::remarks_on_symmetry(fit));
             }
             takes_place

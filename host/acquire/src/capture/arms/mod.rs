@@ -149,6 +149,13 @@ impl Arms {
         })
     }
 
+    /// What both controllers have warned of since the last call.
+    pub fn take_remarks(&mut self) -> Vec<Remark> {
+        let mut remarks = self.light.take_remarks();
+        remarks.extend(self.camera.take_remarks());
+        remarks
+    }
+
     /// The light arm's controller.
     pub fn light(&mut self) -> &mut RemoteController {
         &mut self.light

@@ -212,6 +212,9 @@ impl RoleRun<'_> {
         let taken = shooter.take(task.index, pose, &mut || {
             coordinator.before_trigger().map_err(NoShot::Halt)
         });
+        for remark in shooter.arms().take_remarks() {
+            coordinator.note(&format!("warning: {remark}"));
+        }
         match taken {
             Err(NoShot::Halt(halt)) => Err(halt),
             Ok(ShotOutcome::Kept(shot)) => {

@@ -1,0 +1,156 @@
+//! What all chosen frames show: lines, values of the reference, highlights of a mirror.
+
+use crate::calibrate::error::CalibrateError;
+use crate::calibrate::frames::{Look, Looked};
+use crate::calibrate::lines::LineFrame;
+use crate::calibrate::mirror::MirrorFrame;
+use crate::calibrate::orientation;
+use crate::calibrate::search::first_camera;
+use crate::calibrate::shading::ShadedFrame;
+use crate::process::{FrameRow, FrameSampler, Hidden, Outcome, Role};
+use gonia_formats::checksum;
+use gonia_imaging::{
+    Highlight, NoHighlight, Orientation, Registrar, SamplingGrid, Search, find_highlight,
+};
+use gonia_rig::{Remark, Rig};
+
+/// What all chosen frames show.
+#[derive(Clone)]
+pub struct Seen {
+    /// Lines of frames that show any.
+    pub lines: Vec<LineFrame>,
+    /// Values of the reference.
+    pub shaded: Vec<ShadedFrame>,
+    /// Frames of a mirror.
+    pub mirrors: Vec<MirrorFrame>,
+    /// The frames' checksum.
+    pub checksum: String,
+    /// What is to be said of frames.
+    pub remarks: Vec<Remark>,
+}
+
+/// Lines, values of the reference and highlights of all frames.
+pub fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, CalibrateError> {
+    let camera = first_camera(rig, rows, look)?;
+    let registrar = Registrar::new(&camera);
+    let (sampler, grid) = (FrameSampler::new(&camera), SamplingGrid::new(&camera));
+    let looked = look.each(rows, |row, frame| {
+        let points = registrar.line_points(frame, row.pose, Search::Near);
+        let orientation = registrar.orientation(frame, row.pose.view);
+        let sampled = (row.role == Role::Reference && !points.is_empty())
+            .then(|| sampler.sample(frame, row, Hidden::Find))
+            .filter(|sampled| sampled.report.outcome == Outcome::Locked);
+        let shaded = sampled.and_then(|sampled| ShadedFrame::new(&camera, &grid, &sampled));
+        let lines = LineFrame {
+            row: row.clone(),
+            points,
+        };
+        let highlight = (row.role == Role::Mirror && !lines.points.is_empty()).then(|| {
+            let registration = registrar.register(frame, row.pose);
+            find_highlight(frame, &registration, &camera.target)
+        });
+        Shows {
+            lines,
+            shaded,
+            highlight,
+            orientation,
+            checksum: checksum::of_frame(frame),
+        }
+    })?;
+    gather(looked)
+}
+
+/// Lines that lie beside a material are placed by the light that falls on both: in the light that was found they
+/// are looked at once more.
+pub fn look_again(
+    found: &Rig,
+    rows: &[FrameRow],
+    seen: &mut Seen,
+    look: &Look<'_>,
+) -> Result<(), CalibrateError> {
+    let had = |row: &FrameRow| seen.lines.iter().any(|line| line.row == *row);
+    let rows: Vec<FrameRow> = rows.iter().filter(|row| had(row)).cloned().collect();
+    seen.lines = look.lines(found, &rows, &[Search::Near])?;
+    Ok(())
+}
+
+/// What one frame shows.
+struct Shows {
+    lines: LineFrame,
+    shaded: Option<ShadedFrame>,
+    highlight: Option<Result<Highlight, NoHighlight>>,
+    orientation: Option<Orientation>,
+    checksum: String,
+}
+
+fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
+    let (total, mut lost, mut first_error) = (looked.len(), 0, None);
+    let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
+    let (mut orientations, mut mirrors, mut dark_mirrors) = (Vec::new(), Vec::new(), 0);
+    for one in looked {
+        match one {
+            Ok(shows) => {
+                sums.push_str(&shows.checksum);
+                if let Some(highlight) = shows.highlight {
+                    mirrors.push(mirror_frame(&shows.lines, highlight)?);
+                }
+                if shows.lines.points.is_empty() {
+                    dark_mirrors += usize::from(shows.lines.row.role == Role::Mirror);
+                } else {
+                    orientations.push((shows.lines.row.frame, shows.orientation));
+                    let is_turned = matches!(shows.orientation, Some(Orientation::Turned(_)));
+                    if !is_turned {
+                        lines.push(shows.lines);
+                        shaded.extend(shows.shaded);
+                    }
+                }
+            }
+            Err(error) => {
+                lost += 1;
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    let mut remarks = match first_error {
+        Some(error) if lost == total => return Err(CalibrateError::Frames(error)),
+        Some(error) => vec![Remark::new(
+            format_args!("{lost} of {total} frames"),
+            format_args!("they cannot be used (the first: {error})"),
+            "the calibration stands on the others",
+        )],
+        None => Vec::new(),
+    };
+    remarks.extend(orientation::judged(&orientations)?);
+    if dark_mirrors > 0 {
+        remarks.push(Remark::new(
+            format_args!("{dark_mirrors} frames of the mirror"),
+            "they do not show the fiducial lines, and are left out",
+            "let the light reach the lines about the mirror too",
+        ));
+    }
+    Ok(Seen {
+        lines,
+        shaded,
+        mirrors,
+        checksum: checksum::of_bytes(sums.as_bytes()),
+        remarks,
+    })
+}
+
+fn mirror_frame(
+    lines: &LineFrame,
+    highlight: Result<Highlight, NoHighlight>,
+) -> Result<MirrorFrame, CalibrateError> {
+    let row = &lines.row;
+    match highlight {
+        Ok(highlight) => Ok(MirrorFrame {
+            lines: lines.clone(),
+            highlight,
+        }),
+        Err(why) => Err(CalibrateError::NoHighlight {
+            frame: row.frame,
+            file: row.file.clone(),
+            why,
+        }),
+    }
+}
