@@ -48,9 +48,9 @@ def cpu_seconds():
     return of_children.ru_utime + resource.getrusage(resource.RUSAGE_SELF).ru_utime
 
 
-def ask(gonia, source, rows):
+def ask(gonia, source, rows, *options):
     asked = subprocess.run(
-        [gonia, "query", source], input=table(rows, HEADER, 4), text=True, capture_output=True, check=True
+        [gonia, "query", source, *options], input=table(rows, HEADER, 4), text=True, capture_output=True, check=True
     )
     symmetry = [part for part in asked.stderr.split(", ") if part.startswith("symmetry")]
     values = [float(line.split(",")[4]) for line in asked.stdout.split("\n")[1:] if line]
@@ -81,7 +81,7 @@ def main():
             def by_grid():
                 fill = [gonia, "fill", samples, "-o", dense, "--step", step]
                 subprocess.run(fill, check=True, capture_output=True)
-                return ask(gonia, dense, asked)
+                return ask(gonia, dense, asked, "--grid")
 
             def by_scipy():
                 rbf = RBFInterpolator(
@@ -94,7 +94,8 @@ def main():
                 return np.exp(rbf(vectors(asked))), ""
 
             say("query of the samples", lambda: ask(gonia, samples, asked))
-            say(f"grid of {step} degrees", by_grid)
+            say(f"grid of {step} degrees, filled", by_grid)
+            say("query of that, its samples beside it", lambda: ask(gonia, dense, asked))
             say("scipy, linear, logarithms", by_scipy)
 
 

@@ -66,6 +66,31 @@ pub enum SymmetryKind {
 }
 
 impl SymmetryKind {
+    /// All, from the least to the most.
+    pub const ALL: [SymmetryKind; 5] = [
+        SymmetryKind::None,
+        SymmetryKind::Bilateral,
+        SymmetryKind::HalfTurn,
+        SymmetryKind::HalfTurnBilateral,
+        SymmetryKind::Isotropic,
+    ];
+
+    /// Its word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            SymmetryKind::None => "none",
+            SymmetryKind::Bilateral => "bilateral",
+            SymmetryKind::HalfTurn => "half-turn",
+            SymmetryKind::HalfTurnBilateral => "half-turn-bilateral",
+            SymmetryKind::Isotropic => "isotropic",
+        }
+    }
+
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
     /// What is taken of data that are too few to find a plane in: planes at azimuth 0, sides alike.
     pub(crate) fn untested(self) -> Symmetry {
         let plane = MirrorPlane { azimuth_mdeg: 0 };

@@ -9,32 +9,18 @@
 #![allow(clippy::expect_used)]
 
 mod drawing;
+mod measured;
 
 use drawing::{Line, draw};
-use gonia_brdf::Elementary;
-use gonia_brdf::direction::local_direction;
 use gonia_brdf::interpolate::{ErrorBars, FillSettings};
 use gonia_brdf::model::{Kurt, KurtLobe};
-use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Grid, Pose, Sample};
-use gonia_pipeline::{Options, Side, Table, compare, fill_bins, silent};
-use gonia_plan::Rings;
-use gonia_plan::adaptive::{Reach, propose};
-use gonia_rig::{Figures, Scale, Stratum};
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
+use gonia_brdf::{Bins, Brdf, DenseBrdf, Grid, Pose};
+use gonia_pipeline::{fill_bins, silent};
+use gonia_plan::adaptive::propose;
+use gonia_rig::{Figures, Stratum};
+use measured::{REACH, compared, even, measure};
 use std::fmt::Write as _;
 
-/// The paper's rig.
-const REACH: Reach = Reach {
-    light_m: 1.1,
-    camera_m: 1.8,
-    radius_m: 0.277,
-    theta_max_deg: [85.0, 75.0],
-    keep_out_deg: 8.0,
-};
-/// Standard deviation of a sample, relative.
-const NOISE: f64 = 0.015;
 /// Numbers of poses; each plan but the first grows from the one before.
 const POSES: [usize; 5] = [500, 750, 1000, 1500, 2000];
 
@@ -55,7 +41,7 @@ fn main() {
             continue;
         }
         let model = material(name);
-        let start = even(POSES[0]);
+        let start = even(POSES[0]).listed();
         let mut series = Vec::new();
         for plan in ["rings", "far apart", "adaptive"] {
             let mut poses = start.clone();
@@ -63,7 +49,7 @@ fn main() {
             let mut last: Option<(DenseBrdf, ErrorBars)> = None;
             for n in POSES {
                 if plan == "rings" {
-                    poses = even(n);
+                    poses = even(n).listed();
                 } else if let Some((dense, bars)) = &last
                     && n > poses.len()
                 {
@@ -121,74 +107,10 @@ fn row(material: &str, plan: &str, poses: usize, figures: &Figures) -> String {
     row
 }
 
-fn compared(dense: &DenseBrdf, model: &dyn Brdf) -> Figures {
-    let table = Table {
-        brdf: dense,
-        scale: Scale::Absolute,
-    };
-    compare(table, Side::Model(model), &Options::default()).expect("positive values")
-}
-
 fn filled(poses: &[Pose], model: &dyn Brdf, grid: Grid) -> (DenseBrdf, ErrorBars) {
     let bins = Bins::new(grid, &measure(model, poses));
     let filled = fill_bins(&bins, FillSettings::DEFAULT, true, &silent).expect("enough frames");
     (filled.dense, filled.errors.expect("error bars"))
-}
-
-/// The plan nearest to `n` poses with lights and views equally dense, in rings.
-fn even(n: usize) -> Vec<Pose> {
-    let ring = |theta: f64, step: f64| {
-        let around = 360.0 * theta.to_radians().sine() / step;
-        (theta, around.round().max(1.0) as usize)
-    };
-    let plan = |step: f64| {
-        let rows = (75.0 / step).round().max(1.0);
-        let views: Vec<_> = (0..=rows as usize)
-            .map(|k| ring(75.0 * k as f64 / rows, step))
-            .collect();
-        let mut lights = views.clone();
-        lights.push(ring(85.0, step));
-        Rings { lights, views }.listed()
-    };
-    (0..400)
-        .map(|k| plan(8.0 + 0.1 * f64::from(k)))
-        .min_by_key(|poses| poses.len().abs_diff(n))
-        .expect("steps to try")
-}
-
-fn measure(model: &dyn Brdf, poses: &[Pose]) -> Vec<Sample> {
-    let points: Vec<[f64; 2]> = (-19..=19)
-        .flat_map(|x| (-19..=19).map(move |y| [0.014 * f64::from(x), 0.014 * f64::from(y)]))
-        .filter(|p| p[0].hypotenuse(p[1]) <= REACH.radius_m)
-        .collect();
-    let of_frame = |(frame, pose): (usize, &Pose)| -> Vec<Sample> {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(frame as u64);
-        points
-            .iter()
-            .map(|point| {
-                let l = local_direction(pose.light, REACH.light_m, *point);
-                let v = local_direction(pose.view, REACH.camera_m, *point);
-                let rgb = model
-                    .eval(l, v)
-                    .map(|value| (value * (1.0 + NOISE * normal(&mut random))) as f32);
-                let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
-                Sample::new(l, v, rgb).in_frame(frame as u32)
-            })
-            .collect()
-    };
-    poses
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(of_frame)
-        .collect()
-}
-
-/// A nearly normal number: the sum of twelve uniform ones.
-fn normal(random: &mut Xoshiro256PlusPlus) -> f64 {
-    (0..12)
-        .map(|_| f64::from(random.next_u32()) / f64::from(u32::MAX))
-        .sum::<f64>()
-        - 6.0
 }
 
 fn material(name: &str) -> Box<dyn Brdf> {

@@ -11,6 +11,7 @@ use gonia_formats::dense::{
     ChannelErrors, CombineErrors, ERRORS_OF, check_dense_name, write_dense_channels,
     write_error_bars,
 };
+use gonia_formats::fit_source::files_of_samples;
 use gonia_formats::samples::read_channels_of_all;
 use gonia_formats::{check_output, checksum, is_same_file};
 use gonia_pipeline::budget::{StratumBudget, summary};
@@ -131,6 +132,7 @@ impl Fill {
         let scale = read.scale.unwrap_or(Scale::Relative);
         let mut facts = read.provenance;
         facts.insert("samples".to_owned(), names.clone());
+        facts.extend(files_of_samples(&self.output, &self.samples)?);
         let channels = read.values.channels().clone();
         let filled = self.fill(read.values, scale, &options, facts, &progress);
         let (account, uncertainty) = filled.with_context(|| names)?;

@@ -1,9 +1,13 @@
 //! `gonia plan`: what a session will do, without doing it.
 
 use crate::plan_adaptive::{expectation, propose};
+use crate::symmetry::SymmetryArgument;
 use crate::{output, remarks, table};
 use anyhow::{Result, bail};
-use gonia_acquire::capture::{SETTLE_TIME_S, keep_apart, travelling, travelling_order};
+use gonia_acquire::capture::{
+    SETTLE_TIME_S, keep_apart, travelling, travelling_order, travelling_some,
+};
+use gonia_brdf::{Pose, SymmetryKind};
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_imaging::SamplingGrid;
@@ -24,7 +28,7 @@ const ADD_MAX: usize = 5000;
 /// Orders the poses, checks them against the arms' limits, and estimates time and disk.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n\nWithout rings it is the paper's plan: 105 lights x 81 views."
+    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n  gonia plan rig.toml --symmetry half-turn-bilateral --plane 23 -o plan.csv\n\nA weave mostly has half-turn: half of the poses; with its threads upright on each other half-turn-bilateral: a\nquarter. Give gonia fill the same --symmetry: nothing else fills what was not measured. Without rings it is the paper's plan: 105 lights x 81 views."
 )]
 pub struct Plan {
     /// The rig
@@ -38,6 +42,17 @@ pub struct Plan {
     /// Rings of light directions
     #[arg(long, value_name = "RINGS")]
     lights: Option<RingList>,
+    /// The material's symmetry about its normal, where it is known: leave out the poses that it spares
+    #[arg(long, value_enum, value_name = "SYMMETRY", conflicts_with = "adaptive")]
+    symmetry: Option<SymmetryArgument>,
+    /// Azimuth of the plane of a bilateral symmetry, degrees [default: 0]
+    #[arg(
+        long,
+        value_name = "DEG",
+        requires = "symmetry",
+        allow_negative_numbers = true
+    )]
+    plane: Option<f64>,
     /// Samples measured so far (several files count together): propose the poses that lower the
     /// error of `gonia fill` most
     #[arg(long, value_name = "SAMPLES", num_args = 1.., conflicts_with_all = ["views", "lights"])]
@@ -80,7 +95,10 @@ impl Plan {
                 rings.lights = lights;
             }
             check_limits(&rings)?;
-            (travelling(&rings), Vec::new())
+            match self.symmetry {
+                None => (travelling(&rings), Vec::new()),
+                Some(asked) => spared(&rings, asked, self.plane)?,
+            }
         } else {
             let proposal = propose(&rig, &self.adaptive, self.add, keep_out_deg)?;
             let plan = travelling_order(&proposal.poses);
@@ -133,6 +151,50 @@ impl Plan {
         }
         Ok(keep_out_deg)
     }
+}
+
+/// The poses of rings that a symmetry leaves to measure, and what it spares, as a row.
+fn spared(
+    rings: &Rings,
+    asked: SymmetryArgument,
+    plane_deg: Option<f64>,
+) -> Result<(plan::Plan, Vec<(String, String)>)> {
+    let Some(symmetry) = Option::<SymmetryKind>::from(asked) else {
+        bail!(
+            "--symmetry auto: is found in samples, and a plan comes before them; name the symmetry, or leave it out"
+        );
+    };
+    let has_plane = matches!(
+        symmetry,
+        SymmetryKind::Bilateral | SymmetryKind::HalfTurnBilateral
+    );
+    let plane_deg = match plane_deg {
+        Some(plane) if !has_plane => {
+            bail!(
+                "--plane {plane}: the symmetry {} has no plane; leave it out",
+                symmetry.name()
+            )
+        }
+        Some(plane) if !(-360.0..=360.0).contains(&plane) => {
+            bail!("--plane {plane}: must lie in -360..=360 degrees")
+        }
+        plane => plane.unwrap_or(0.0),
+    };
+    let needed = |pose: &Pose| plan::symmetry::is_needed(pose, symmetry, plane_deg);
+    let plan = travelling_some(rings, &needed);
+    let of_plane = if has_plane {
+        format!(" about azimuth {plane_deg}")
+    } else {
+        String::new()
+    };
+    let row = format!(
+        "{}{of_plane}: {} of {} poses; fill with --symmetry {}",
+        symmetry.name(),
+        table::count(plan.poses.len() as u64),
+        table::count(rings.count() as u64),
+        symmetry.name()
+    );
+    Ok((plan, vec![("symmetry".to_owned(), row)]))
 }
 
 /// Refuses polar angles beyond the controllers' default limits.

@@ -8,25 +8,30 @@ use gonia_brdf::{Direction, Grid};
 use gonia_formats::dense::DenseLookup;
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
 use gonia_formats::samples::read_channels;
-use gonia_pipeline::FitOfSamples;
 use gonia_pipeline::budget::budget_in;
+use gonia_pipeline::provenance::Provenance;
+use gonia_pipeline::{Behind, FitOfSamples};
 use gonia_rig::{Channels, Remark};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Reads directions from standard input (a table with the columns theta_i, phi_i, theta_v, phi_v, in
-/// degrees) and writes them with r, g, b (or Y, or 380nm, ...: the channels that there are): of a dense BRDF interpolated between the nodes, of samples as
-/// a fit to them has it at the very directions.
+/// degrees) and writes them with r, g, b (or Y, or 380nm, ...: the channels that there are): of samples as a fit to
+/// them has it at the very directions; of a dense BRDF the same where its values are a fit of few samples and these
+/// are still there, else interpolated between the nodes.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nOf samples (.npy, .npz, .csv, .txt, .tsv; at most a million) no grid comes in between: a peak that is narrower than\na grid's step is kept. What symmetry was taken of them is printed on standard error.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
+    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nOf samples (.npy, .npz, .csv, .txt, .tsv; at most a million) no grid comes in between: a peak that is narrower than\na grid's step is kept. gonia fill leaves in DENSE.exr where its samples are, and their checksum: they are looked for\nthere and beside it. What is asked, the fit or the grid, and what symmetry was taken of samples, is printed on standard error.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
 )]
 pub struct Query {
     /// The dense BRDF, or the samples themselves
     dense: PathBuf,
-    /// Of samples: the material's symmetry about its normal
-    #[arg(long, value_enum, default_value = "auto")]
-    symmetry: SymmetryArgument,
+    /// Of samples: the material's symmetry about its normal [default: auto; of a dense BRDF that of its fill]
+    #[arg(long, value_enum)]
+    symmetry: Option<SymmetryArgument>,
+    /// Of a dense BRDF: ask its grid, though its samples are there
+    #[arg(long)]
+    grid: bool,
     /// Add the standard uncertainty of each value (u, k = 1) and the expanded one (U, k = 2): of samples by the fit
     /// and what they say of their rig, of a dense BRDF from the file that --error names
     #[arg(long)]
@@ -53,9 +58,45 @@ impl Query {
 
     fn ask_dense(self) -> Result<()> {
         let mut brdf = DenseLookup::open(&self.dense)?;
+        if self.symmetry.is_some() {
+            bail!(
+                "--symmetry: {} is a dense BRDF, which has the symmetry of its fill; leave it out, or give the samples",
+                self.dense.display()
+            );
+        }
+        // Error bars are those of the grid.
+        if !self.grid && self.error.is_none() {
+            let behind = Behind::of(&self.dense, &mut brdf)
+                .with_context(|| format!("the samples of {}", self.dense.display()))?;
+            match behind {
+                Behind::Grid => {}
+                Behind::Fit {
+                    fit,
+                    samples,
+                    remarks,
+                } => {
+                    remarks::print(&remarks);
+                    let names: Vec<String> = samples
+                        .iter()
+                        .map(|path| path.display().to_string())
+                        .collect();
+                    let provenance = brdf.provenance().clone();
+                    return self.ask_fit(&fit, &names.join(" "), &provenance);
+                }
+                Behind::Missing(samples) => errln!(
+                    "asked: the grid, linear between its nodes; {}, whose fit it is, is not there",
+                    samples.display()
+                ),
+                Behind::Other(remark) => remarks::print(&[remark]),
+            }
+        }
+        self.ask_grid(&mut brdf)
+    }
+
+    fn ask_grid(&self, brdf: &mut DenseLookup) -> Result<()> {
         let rows = asked()?;
         let mut beyond = Beyond::of(brdf.grid());
-        let mut errors = self.errors_of(&brdf)?;
+        let mut errors = self.errors_of(brdf)?;
         let mut out = BufWriter::new(std::io::stdout().lock());
         let mut said = header(&mut out, brdf.channels(), errors.is_some());
         for asked in rows {
@@ -98,18 +139,35 @@ impl Query {
     }
 
     fn ask_samples(self) -> Result<()> {
+        if self.grid {
+            bail!(
+                "--grid: {} is samples, which have no grid; leave it out, or give a dense BRDF",
+                self.dense.display()
+            );
+        }
         let read = read_channels(&self.dense)?;
         remarks::print(&read.remarks);
         let provenance = read.provenance;
-        let (fit, said_of_it) = FitOfSamples::new(read.values, self.symmetry.into())
-            .with_context(|| self.dense.display().to_string())?;
+        let name = self.dense.display().to_string();
+        let symmetry = self.symmetry.and_then(Into::into);
+        let (fit, said_of_it) =
+            FitOfSamples::new(read.values, symmetry).with_context(|| name.clone())?;
         remarks::print(&said_of_it);
+        self.ask_fit(&fit, &name, &provenance)
+    }
+
+    /// Asks a fit at the directions on standard input, and says which it is. `provenance` is that of its samples.
+    fn ask_fit(&self, fit: &FitOfSamples, samples: &str, provenance: &Provenance) -> Result<()> {
         let choice = fit.choice();
-        errln!("{} ({})", choice.settings, choice.reason);
+        errln!(
+            "asked: the fit of {samples}; {} ({})",
+            choice.settings,
+            choice.reason
+        );
         let rows = asked()?;
         let pairs: Vec<_> = rows.iter().map(|asked| pair_of(asked.angles_deg)).collect();
         let found = if self.uncertainty {
-            let budget = budget_in(&provenance)?;
+            let budget = budget_in(provenance)?;
             if budget.is_none() {
                 errln!(
                     "u holds noise and interpolation alone: the samples say nothing of their rig"

@@ -185,6 +185,14 @@ fn questions_that_make_no_sense_are_refused() {
     assert!(refused(&["report", text(dir.path())], "").contains("dense.exr"));
     let rig = dir.path().join("rig.toml");
     write_rig(&rig, &Rig::paper(64)).unwrap();
+    for (arguments, word) in [
+        (["--symmetry=auto", "--dwell=1"], "--symmetry auto"),
+        (["--symmetry=half-turn", "--plane=3"], "has no plane"),
+        (["--symmetry=bilateral", "--plane=inf"], "--plane inf"),
+    ] {
+        let said = refused(&[&["plan", text(&rig)], &arguments[..]].concat(), "");
+        assert!(said.contains(word), "{said}");
+    }
     let said = refused(&["plan", text(&rig), "--dwell=-5"], "");
     assert!(said.contains("--dwell -5"), "{said}");
 }

@@ -8,6 +8,7 @@ mod common;
 use cases::{Case, document};
 use common::{gonia, text};
 use gonia_brdf::Elementary;
+use gonia_formats::dense::{read_dense_channels, write_dense_channels};
 use gonia_rig::{Budget, Input, KnownFrom, ReferenceCalibration};
 use std::fmt::Write as _;
 use std::fs;
@@ -395,11 +396,86 @@ fn values_have_uncertainties_that_hold_what_the_samples_say_of_their_rig() {
     for [value, u] in by_grid {
         assert!(u > 0.05 * value && u < 0.2 * value, "{value} {u}");
     }
-    let output = gonia(&["query", text(&dense), "--uncertainty"], asked);
+    let output = gonia(&["query", text(&dense), "--uncertainty", "--grid"], asked);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(
         said.contains("--error ERR.exr") && said.lines().count() == 1,
         "{said}"
     );
+}
+
+#[test]
+fn a_dense_brdf_of_few_samples_is_asked_by_their_fit_and_its_grid_where_they_are_not_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let (samples, dense) = (at("peak.csv"), at("d.exr"));
+    let value = |theta: f64| 0.1 + 2.0 * (-((theta - 30.3) / 0.5).powi(2)).exponential();
+    let mut csv = String::from("theta_i,phi_i,theta_v,phi_v,brdf\n");
+    let mut asked = String::from("theta_i,phi_i,theta_v,phi_v\n");
+    for k in 0..400 {
+        let theta = f64::from(k) * 0.1 + 10.0;
+        // Every fifth is held out.
+        match k % 5 {
+            4 => writeln!(asked, "30,0,{theta},0").unwrap(),
+            _ => writeln!(csv, "30,0,{theta},0,{}", value(theta)).unwrap(),
+        }
+    }
+    fs::write(&samples, &csv).unwrap();
+    let fill = ["fill", text(&samples), "-o", text(&dense), "--step", "6"];
+    assert_eq!(gonia(&fill, "").status.code(), Some(0));
+    // What is printed, the largest error at the held-out directions, and what is said.
+    let query = |arguments: &[&str]| {
+        let output = gonia(&[&["query"], arguments].concat(), &asked);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        let off = printed.lines().skip(1).map(|line| {
+            let row: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+            (row[4] / value(row[2])).natural_log().abs()
+        });
+        let off = off.fold(0.0, f64::max);
+        (printed, off, said)
+    };
+    let (of_samples, off, _) = query(&[text(&samples)]);
+    assert!(off < 0.05, "{off}");
+    let (printed, _, said) = query(&[text(&dense)]);
+    assert_eq!(printed, of_samples);
+    assert!(
+        said.contains("asked: the fit of") && said.contains("peak.csv"),
+        "{said}"
+    );
+    let (of_grid, off, said) = query(&[text(&dense), "--grid"]);
+    assert!(off > 0.5 && !said.contains("asked"), "{off} {said}");
+    // The same values times 1.5, with what was said of them.
+    let mut file = read_dense_channels(&dense).unwrap();
+    file.planes[0].iter_mut().for_each(|value| *value *= 1.5);
+    let scaled = at("scaled.exr");
+    write_dense_channels(&scaled, &file).unwrap();
+    let (printed, _, said) = query(&[text(&scaled)]);
+    assert_ne!(printed, of_samples);
+    assert!(
+        said.contains("its values are not those of its samples"),
+        "{said}"
+    );
+    fs::write(&samples, csv + "30,0,60,0,0.1\n").unwrap();
+    let (printed, _, said) = query(&[text(&dense)]);
+    assert_eq!(printed, of_grid);
+    assert!(said.contains("peak.csv has changed"), "{said}");
+    fs::remove_file(&samples).unwrap();
+    let (printed, _, said) = query(&[text(&dense)]);
+    assert_eq!(printed, of_grid);
+    assert!(
+        said.contains("is not there") && !said.contains("warning"),
+        "{said}"
+    );
+    for (arguments, word) in [
+        (["query", text(&dense), "--symmetry=none"], "--symmetry"),
+        (["query", text(&at("peak.csv")), "--grid"], "--grid"),
+    ] {
+        let output = gonia(&arguments, &asked);
+        assert_eq!(output.status.code(), Some(1));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains(word) && said.lines().count() == 1, "{said}");
+    }
 }

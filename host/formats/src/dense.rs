@@ -152,6 +152,22 @@ impl DenseLookup {
         }
     }
 
+    /// Whether the values are 1/sr.
+    pub fn scale(&self) -> Scale {
+        match &self.source {
+            LookupSource::InMemory(brdf) => brdf.scale,
+            LookupSource::OnDisk(reader) => reader.scale(),
+        }
+    }
+
+    /// Where the data came from, by name.
+    pub fn provenance(&self) -> &BTreeMap<String, String> {
+        match &self.source {
+            LookupSource::InMemory(brdf) => &brdf.provenance,
+            LookupSource::OnDisk(reader) => reader.provenance(),
+        }
+    }
+
     /// The value of each channel between the nodes: see [`Grid::lookup`].
     ///
     /// # Errors
@@ -287,6 +303,8 @@ mod tests {
             assert!((values..values + 30_000).contains(&size), "{size}");
             let mut lookup = DenseLookup::open(&path).unwrap();
             assert_eq!(lookup.channels(), &kind);
+            assert_eq!(lookup.scale(), Scale::Absolute);
+            assert_eq!(lookup.provenance(), &file.provenance);
             let (light, view) = (
                 Direction::from_deg(31.0, 5.0),
                 Direction::from_deg(9.0, 77.0),

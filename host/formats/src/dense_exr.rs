@@ -99,6 +99,8 @@ fn write_by_rows(
 /// A plain file, open.
 struct OnDisk {
     grid: Grid,
+    scale: Scale,
+    provenance: BTreeMap<String, String>,
     reader: RowReader,
     path: PathBuf,
 }
@@ -111,8 +113,13 @@ fn open(path: &Path) -> Result<Option<Box<dyn CellReader>>, FileError> {
     let Some(grid) = Grid::from_directions(reader.side()) else {
         return Ok(None);
     };
-    let path = path.to_owned();
-    Ok(Some(Box::new(OnDisk { grid, reader, path })))
+    Ok(Some(Box::new(OnDisk {
+        grid,
+        scale: scale_of(path, reader.attributes())?,
+        provenance: provenance_of(reader.attributes()),
+        reader,
+        path: path.to_owned(),
+    })))
 }
 
 impl CellReader for OnDisk {
@@ -122,6 +129,14 @@ impl CellReader for OnDisk {
 
     fn channels(&self) -> &Channels {
         self.reader.channels()
+    }
+
+    fn scale(&self) -> Scale {
+        self.scale
+    }
+
+    fn provenance(&self) -> &BTreeMap<String, String> {
+        &self.provenance
     }
 
     fn cell(&self, light: usize, view: usize, channel: usize) -> Result<f32, FileError> {
@@ -153,32 +168,36 @@ fn read(path: &Path) -> Result<DenseChannels, FileError> {
         Some(read) => read,
         None => read_any(path)?,
     };
-    let scale = match attributes.get(SCALE).map(String::as_str) {
-        Some("absolute") => Scale::Absolute,
-        Some("relative") | None => Scale::Relative,
-        Some(other) => {
-            return Err(FileError::new(
-                path,
-                format_args!("\"{other}\" is no scale"),
-                "write absolute or relative",
-            )
-            .at(format_args!("attribute {SCALE}")));
-        }
-    };
-    let provenance = attributes
-        .iter()
-        .filter(|(name, _)| *name != SCALE)
-        .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
-        .collect();
     let file = DenseChannels {
         channels,
         grid,
         planes,
-        scale,
-        provenance,
+        scale: scale_of(path, &attributes)?,
+        provenance: provenance_of(&attributes),
     };
     check_finite(path, &file)?;
     Ok(file)
+}
+
+fn scale_of(path: &Path, attributes: &BTreeMap<String, String>) -> Result<Scale, FileError> {
+    match attributes.get(SCALE).map(String::as_str) {
+        Some("absolute") => Ok(Scale::Absolute),
+        Some("relative") | None => Ok(Scale::Relative),
+        Some(other) => Err(FileError::new(
+            path,
+            format_args!("\"{other}\" is no scale"),
+            "write absolute or relative",
+        )
+        .at(format_args!("attribute {SCALE}"))),
+    }
+}
+
+fn provenance_of(attributes: &BTreeMap<String, String>) -> BTreeMap<String, String> {
+    attributes
+        .iter()
+        .filter(|(name, _)| *name != SCALE)
+        .filter_map(|(name, text)| Some((name.strip_prefix(PREFIX)?.to_owned(), text.clone())))
+        .collect()
 }
 
 /// What a file holds, with its text attributes.

@@ -120,6 +120,12 @@ pub(crate) trait CellReader: Send {
     /// What the channels are.
     fn channels(&self) -> &Channels;
 
+    /// Whether the values are 1/sr.
+    fn scale(&self) -> Scale;
+
+    /// Where the data came from, by name.
+    fn provenance(&self) -> &BTreeMap<String, String>;
+
     /// The value of a cell, by the indices of its light and view directions, in a channel.
     ///
     /// # Errors

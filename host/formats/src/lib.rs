@@ -37,6 +37,7 @@ mod exr_colours;
 mod exr_header;
 mod exr_planes;
 mod exr_rows;
+pub mod fit_source;
 pub mod fit_toml;
 pub mod foreign;
 mod format;

@@ -17,6 +17,7 @@
 //! | [`calibrate()`] | a capture folder's frames | the rig's geometry, with uncertainties |
 //! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples of any channels, or bins | a dense BRDF, with standard errors where asked for |
 //! | [`FitOfSamples`] | few samples | a fit that is asked anywhere, without a grid |
+//! | [`Behind`] | a dense BRDF whose samples are there | the same fit |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
 //! | [`compare()`] | two BRDFs | figures of merit by stratum |
 //! | [`export`] | a dense BRDF | a file in another group's format, and what was lost |
@@ -53,8 +54,8 @@ pub use compare_bands::{BandFigures, compare_bands};
 pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
-    FillAccount, FillCounts, FillMethod, FillOptions, Filled, FilledBins, FitOfSamples, fill,
-    fill_bins, fill_to_file,
+    Behind, FillAccount, FillCounts, FillMethod, FillOptions, Filled, FilledBins, FitOfSamples,
+    fill, fill_bins, fill_to_file,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};

@@ -5,6 +5,7 @@
 
 pub mod adaptive;
 mod bound;
+pub mod symmetry;
 pub mod tour;
 
 use gonia_brdf::hemisphere::{OBLIQUE_LIGHTS, Ring, UNIFORM_RINGS, directions};
@@ -37,6 +38,12 @@ impl Rings {
         let mut lights = views.clone();
         lights.push((85.0, 12));
         Self { lights, views }
+    }
+
+    /// How many poses there are.
+    pub fn count(&self) -> usize {
+        let directions = |rings: &[Ring]| rings.iter().map(|(_, n)| n).sum::<usize>();
+        directions(&self.lights) * directions(&self.views)
     }
 
     /// All poses, light by light, as the paper lists them.
@@ -116,11 +123,28 @@ pub fn order(poses: &[Pose], light_time: MoveTime, view_time: MoveTime) -> Plan 
 
 /// Orders all poses of some rings. `light_time` and `view_time` are the arms' own.
 pub fn plan(rings: &Rings, light_time: MoveTime, view_time: MoveTime) -> Plan {
-    let lights = directions(&rings.lights);
-    let views = directions(&rings.views);
+    plan_some(rings, &|_| true, light_time, view_time)
+}
+
+/// Orders those poses of some rings that are needed.
+pub fn plan_some(
+    rings: &Rings,
+    needed: &dyn Fn(&Pose) -> bool,
+    light_time: MoveTime,
+    view_time: MoveTime,
+) -> Plan {
+    let listed: Vec<Pose> = rings.listed().into_iter().filter(needed).collect();
+    let in_some = |of: &dyn Fn(&Pose) -> Direction, direction: &Direction| {
+        listed.iter().any(|pose| of(pose) == *direction)
+    };
+    let is_all = listed.len() == rings.count();
+    let mut lights = directions(&rings.lights);
+    lights.retain(|light| in_some(&|pose| pose.light, light));
+    let mut views = directions(&rings.views);
+    views.retain(|view| in_some(&|pose| pose.view, view));
     let light_path = tour::shortest_path(&lights, light_time);
     let view_path = tour::shortest_path(&views, view_time);
-    let snake = |lights_inside: bool| -> Vec<Pose> {
+    let pairs = |lights_inside: bool| -> Vec<Pose> {
         let pair = |outer: usize, inner: usize| {
             let (l, v) = if lights_inside {
                 (inner, outer)
@@ -154,6 +178,11 @@ pub fn plan(rings: &Rings, light_time: MoveTime, view_time: MoveTime) -> Plan {
             )
         }
     };
+    let snake = |lights_inside: bool| -> Vec<Pose> {
+        let mut poses = pairs(lights_inside);
+        poses.retain(needed);
+        poses
+    };
     let time = |poses: &[Pose]| travel_time(poses, light_time, view_time);
     let (a, b) = (snake(true), snake(false));
     let (time_a, time_b) = (time(&a), time(&b));
@@ -165,8 +194,8 @@ pub fn plan(rings: &Rings, light_time: MoveTime, view_time: MoveTime) -> Plan {
     Plan {
         poses,
         travel_s,
-        others: Some(OtherOrders {
-            listed_s: time(&rings.listed()),
+        others: is_all.then(|| OtherOrders {
+            listed_s: time(&listed),
             bound_s: bound::bound(&lights, &views, light_time, view_time),
         }),
     }
@@ -215,6 +244,7 @@ pub fn travel_time(poses: &[Pose], light_time: MoveTime, view_time: MoveTime) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::SymmetryKind;
 
     /// A degree a second, whichever axis is slower.
     fn time(a: Direction, b: Direction) -> f64 {
@@ -255,6 +285,26 @@ mod tests {
             plan.travel_s,
             others.bound_s
         );
+    }
+
+    #[test]
+    fn some_poses_travel_no_longer_than_all_and_each_is_there_once() {
+        let rings = Rings::paper();
+        let needed = |pose: &Pose| symmetry::is_needed(pose, SymmetryKind::HalfTurn, 0.0);
+        let (all, half) = (
+            plan(&rings, &time, &time),
+            plan_some(&rings, &needed, &time, &time),
+        );
+        assert_eq!((rings.count(), half.poses.len()), (8505, 4253));
+        let mut listed = rings.listed();
+        listed.retain(needed);
+        assert!(listed.iter().all(|pose| half.poses.contains(pose)));
+        assert!(
+            half.travel_s < 0.6 * all.travel_s,
+            "{}",
+            half.travel_s / all.travel_s
+        );
+        assert_eq!(half.others, None);
     }
 
     #[test]

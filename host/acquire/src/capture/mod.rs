@@ -44,6 +44,6 @@ pub use port::{PortOpener, SessionPort};
 pub use shooter::{SessionError, SessionSummary, Shooter, run_session};
 pub use shot::{Shot, ShotOutcome};
 pub use timing::{POINTING_LIMIT_DEG, SETTLE_TIME_S, move_time_s, nearest_turn_deg};
-pub use travel::{KeptApart, keep_apart, travelling, travelling_order};
+pub use travel::{KeptApart, keep_apart, travelling, travelling_order, travelling_some};
 pub use unattended::{Ended, UnattendedSession};
 pub use watch::{SessionEvent, Watch, Watchers};

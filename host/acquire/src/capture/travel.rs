@@ -11,6 +11,11 @@ pub fn travelling(rings: &Rings) -> Plan {
     gonia_plan::plan(rings, &arm_time_s, &arm_time_s)
 }
 
+/// The same of those poses that are needed.
+pub fn travelling_some(rings: &Rings, needed: &dyn Fn(&Pose) -> bool) -> Plan {
+    gonia_plan::plan_some(rings, needed, &arm_time_s, &arm_time_s)
+}
+
 /// Poses in the order in which the arms get through them fastest.
 pub fn travelling_order(poses: &[Pose]) -> Plan {
     gonia_plan::order(poses, &arm_time_s, &arm_time_s)

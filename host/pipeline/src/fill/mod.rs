@@ -10,7 +10,9 @@
 //! | `blocks`, `planes` | bins → planes in memory |
 //! | `rows` | the same, written row by row |
 //! | `directions` | a fit that is asked without a grid |
+//! | `behind` | the same of a dense BRDF, whose samples are still there |
 
+mod behind;
 mod blocks;
 mod directions;
 mod groups;
@@ -21,6 +23,7 @@ mod prepared;
 mod rows;
 mod symmetry;
 
+pub use behind::Behind;
 pub use blocks::{FilledBins, fill_bins};
 pub use directions::FitOfSamples;
 pub use options::{FillMethod, FillOptions};
@@ -29,7 +32,6 @@ pub use rows::fill_to_file;
 use crate::Error;
 use crate::doubts::{self, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
-use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::baselines;
 use gonia_brdf::interpolate::OriginCounts;
 use gonia_formats::dense::ChannelErrors;
@@ -150,8 +152,7 @@ pub fn fill(
             settings.to_string()
         }
     };
-    let mut provenance = provenance_of(&settings);
-    provenance.insert("symmetry".into(), prepared.symmetry.clone());
+    let provenance = prepared.provenance(&settings, options);
     let errors = options.with_errors.then(|| ChannelErrors {
         channels: channels.clone(),
         standard_error: planes.errors,
@@ -182,13 +183,6 @@ pub fn fill(
         cells,
         account,
     })
-}
-
-/// What a filled BRDF says of its making.
-fn provenance_of(settings: &str) -> Provenance {
-    let mut facts = of_this_program();
-    facts.insert("interpolation".into(), settings.to_owned());
-    facts
 }
 
 #[cfg(test)]

@@ -8,9 +8,11 @@ use super::symmetry::{scattered_fit, symmetry_of_many};
 use crate::Error;
 use crate::doubts::{self, Isotropy};
 use crate::progress::{Progress, Step, step};
+use crate::provenance::{Provenance, of_this_program};
 use gonia_brdf::interpolate::OriginCounts;
-use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit};
+use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit, is_few};
 use gonia_brdf::{Bin, Bins, Grid, Symmetry};
+use gonia_formats::fit_source::{FIT_SYMMETRY, fit_symmetry};
 use gonia_rig::{Remark, SampleValues};
 
 /// Samples in their bins, by three channels that stand for all, and what is to be said of them. Doubts, symmetry
@@ -18,6 +20,8 @@ use gonia_rig::{Remark, SampleValues};
 pub(super) struct Prepared {
     pub bins: Bins,
     samples: usize,
+    /// Whether a fit is of the samples, and not of what shares cells of many.
+    are_few: bool,
     /// How many of a sample are in the bins: with its images.
     images: usize,
     /// The fit of few samples, or of those of an isotropic material: it takes the place of the bins.
@@ -83,6 +87,7 @@ impl Prepared {
         Ok(Self {
             bins,
             samples: count,
+            are_few: is_few(&samples),
             images,
             fit,
             symmetry: format!("{symmetry}, {reason}"),
@@ -90,6 +95,19 @@ impl Prepared {
             origins,
             remarks,
         })
+    }
+
+    /// What a BRDF that is filled from these says of its making.
+    pub fn provenance(&self, settings: &str, options: &FillOptions) -> Provenance {
+        let mut facts = of_this_program();
+        facts.insert("interpolation".into(), settings.to_owned());
+        facts.insert("symmetry".into(), self.symmetry.clone());
+        // A fit of the samples as they are: with their file and this it can be made again.
+        if self.fit.is_some() && self.are_few {
+            let symmetry = fit_symmetry(options.symmetry).to_owned();
+            facts.insert(FIT_SYMMETRY.into(), symmetry);
+        }
+        facts
     }
 
     /// The largest polar angle of light, or by reciprocity of view, that was measured.

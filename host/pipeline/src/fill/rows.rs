@@ -1,12 +1,12 @@
 //! A fill that does not fit memory: written row by row, or a few channels at a time.
 
+use super::FillAccount;
 use super::blocks::{chosen, sorted};
 use super::groups::{groups, groups_from_middle, spread_over, stand_for_themselves};
 use super::options::FillOptions;
 use super::planes::bins_of;
 use super::prepared::Prepared;
 use super::symmetry::fit_of_others;
-use super::{FillAccount, provenance_of};
 use crate::Error;
 use crate::doubts::{self, AlbedoRows, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
@@ -46,6 +46,7 @@ pub fn fill_to_file(
         channels: &channels,
         scale,
         grid,
+        options,
         base,
         path,
         facts,
@@ -77,6 +78,7 @@ struct ToRows<'a> {
     channels: &'a Channels,
     scale: Scale,
     grid: Grid,
+    options: &'a FillOptions,
     base: FillSettings,
     path: &'a Path,
     facts: &'a Provenance,
@@ -126,8 +128,7 @@ impl ToRows<'_> {
         settings: String,
         mut make: impl FnMut(&TakeGroup<'_>) -> Result<(), Stopped>,
     ) -> Result<(String, DirectionalAlbedo), Error> {
-        let mut provenance = provenance_of(&settings);
-        provenance.insert("symmetry".into(), self.prepared.symmetry.clone());
+        let mut provenance = self.prepared.provenance(&settings, self.options);
         provenance.extend(self.facts.clone());
         let note = RowsNote {
             channels: self.channels,

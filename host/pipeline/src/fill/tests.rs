@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::progress::silent;
+use crate::provenance::Provenance;
 use gonia_brdf::random::Random;
 use gonia_brdf::{Direction, Elementary, Sample, SymmetryKind};
 use gonia_formats::dense::read_dense_channels;
