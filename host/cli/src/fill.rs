@@ -56,6 +56,10 @@ pub struct Fill {
     /// none, isotropic, bilateral, half-turn or half-turn-bilateral
     #[arg(long, value_enum, default_value = "auto")]
     symmetry: SymmetryArgument,
+    /// Azimuth of the plane of a bilateral symmetry, degrees, where it is known (as of gonia plan --symmetry)
+    /// [default: found, where samples lie on both of its sides]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    plane: Option<f64>,
     /// default, or a method that works cell by cell: paper, nearest, shepard, mls1, mls2,
     /// rbf-KERNEL (core-hours on the 2-degree grid)
     #[arg(long, value_name = "NAME", default_value = "default")]
@@ -102,6 +106,7 @@ impl Fill {
             tolerance: self.tolerance,
             with_errors: self.error.is_some(),
             symmetry: self.symmetry.into(),
+            plane_deg: self.plane,
             ..FillOptions::default()
         };
         let (grid, _) = options.check()?;

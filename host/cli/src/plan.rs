@@ -28,7 +28,7 @@ const ADD_MAX: usize = 5000;
 /// Orders the poses, checks them against the arms' limits, and estimates time and disk.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n  gonia plan rig.toml --symmetry half-turn-bilateral --plane 23 -o plan.csv\n\nA weave mostly has half-turn: half of the poses; with its threads upright on each other half-turn-bilateral: a\nquarter. Give gonia fill the same --symmetry: nothing else fills what was not measured. Without rings it is the paper's plan: 105 lights x 81 views."
+    after_long_help = "Example:\n  gonia plan rig.toml -o plan.csv\n  gonia plan rig.toml --views 0:1,30:12,60:20 --lights 0:1,30:12,60:20,85:24\n  gonia plan rig.toml --adaptive samples.npy --add 500 -o more.csv\n  gonia plan rig.toml --symmetry half-turn-bilateral --plane 23 -o plan.csv\n\nA weave mostly has half-turn: half of the poses; with its threads upright on each other half-turn-bilateral: a\nquarter. Give gonia fill the same --symmetry and --plane: nothing else fills what was not measured. Without rings it is the paper's plan: 105 lights x 81 views."
 )]
 pub struct Plan {
     /// The rig
@@ -182,13 +182,16 @@ fn spared(
     };
     let needed = |pose: &Pose| plan::symmetry::is_needed(pose, symmetry, plane_deg);
     let plan = travelling_some(rings, &needed);
-    let of_plane = if has_plane {
-        format!(" about azimuth {plane_deg}")
+    let [of_plane, option] = if has_plane {
+        [
+            format!(" about azimuth {plane_deg}"),
+            format!(" --plane {plane_deg}"),
+        ]
     } else {
-        String::new()
+        [String::new(), String::new()]
     };
     let row = format!(
-        "{}{of_plane}: {} of {} poses; fill with --symmetry {}",
+        "{}{of_plane}: {} of {} poses; fill with --symmetry {}{option}",
         symmetry.name(),
         table::count(plan.poses.len() as u64),
         table::count(rings.count() as u64),

@@ -3,7 +3,7 @@
 use crate::Error;
 use gonia_brdf::baselines::{BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{AnyKernel, FillSettings, Kernel, Matern32, Preset};
-use gonia_brdf::{Grid, SymmetryKind};
+use gonia_brdf::{Grid, MirrorPlane, Symmetry, SymmetryKind};
 use gonia_rig::Channels;
 use std::str::FromStr;
 
@@ -30,6 +30,9 @@ pub struct FillOptions {
     /// The symmetry of the material about its normal; without it, what few samples show or leave to be assumed,
     /// and none of many.
     pub symmetry: Option<SymmetryKind>,
+    /// The azimuth of the plane of a bilateral symmetry, degrees, where it is known: samples on one side of it do not
+    /// tell.
+    pub plane_deg: Option<f64>,
 }
 
 impl Default for FillOptions {
@@ -45,6 +48,7 @@ impl Default for FillOptions {
             kernel: &Matern32,
             with_errors: false,
             symmetry: None,
+            plane_deg: None,
         }
     }
 }
@@ -159,6 +163,12 @@ impl FillOptions {
             "not on a grid of {} degrees, which is filled row by row; leave it out",
             self.step_deg
         );
+        if let Some(plane) = self.plane_deg
+            && self.symmetry_of_plane().is_none()
+        {
+            let remedy = "only --symmetry bilateral and half-turn-bilateral have a plane, of -360 to 360 degrees";
+            return refuse("--plane", plane.to_string(), remedy.into());
+        }
         if self.symmetry == Some(SymmetryKind::Isotropic) && grid.n_cells() > CELLS_IN_MEMORY {
             return refuse("--symmetry", "isotropic".into(), by_rows);
         }
@@ -184,6 +194,17 @@ impl FillOptions {
             return refuse("--method", self.step_deg.to_string(), by_rows);
         }
         Ok(())
+    }
+
+    /// The symmetry about a plane that is known; `None` of any other.
+    pub(super) fn symmetry_of_plane(&self) -> Option<Symmetry> {
+        let azimuth = self.plane_deg.filter(|deg| deg.abs() <= 360.0)?;
+        let plane = MirrorPlane::at_deg(azimuth);
+        match self.symmetry? {
+            SymmetryKind::Bilateral => Some(Symmetry::Bilateral(plane)),
+            SymmetryKind::HalfTurnBilateral => Some(Symmetry::HalfTurnBilateral(plane)),
+            _ => None,
+        }
     }
 
     /// Whether something is asked for that only blocks have: few anisotropic samples are filled by them then.

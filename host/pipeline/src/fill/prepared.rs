@@ -46,8 +46,14 @@ impl Prepared {
         let mut remarks = doubts::of_oddities(&all.keep_sound());
         let samples = all.three(spread_over(all.channels().count()));
         remarks.extend(doubts::of_samples(&samples)?);
-        let fit = scattered_fit(&samples, grid, options, progress)?;
+        // About a plane that is known the samples are completed by their images, however few they are.
+        let known = options.symmetry_of_plane();
+        let fit = match known {
+            Some(_) => None,
+            None => scattered_fit(&samples, grid, options, progress)?,
+        };
         let (symmetry, reason) = match (&fit, options.symmetry) {
+            (None, _) if known.is_some() => (known.unwrap_or(Symmetry::None), Reason::Asked),
             (Some(fit), _) => (fit.choice().settings.symmetry, fit.choice().reason),
             (None, Some(asked)) => {
                 let (symmetry, said) = symmetry_of_many(&samples, asked);

@@ -143,3 +143,49 @@ fn samples_that_cannot_stand_count_as_outside_in_every_channel() {
     let counts = filled.account.counts;
     assert_eq!((counts.binned + counts.outside, counts.outside), (n, 1));
 }
+
+#[test]
+fn about_a_plane_that_is_known_one_side_is_enough() {
+    let mut one_side = samples(Channels::Single);
+    let both = one_side.clone();
+    let is_kept: Vec<bool> = both.places.iter().map(|s| s.phi_i_deg < 180.0).collect();
+    let mut kept = is_kept.iter();
+    one_side.places.retain(|_| kept.next() == Some(&true));
+    let mut kept = is_kept.iter();
+    one_side.values.retain(|_| kept.next() == Some(&true));
+    // The largest error under lights of the other side.
+    let error = |plane_deg: Option<f64>| {
+        let options = FillOptions {
+            symmetry: Some(SymmetryKind::Bilateral),
+            plane_deg,
+            ..options(false)
+        };
+        let filled = fill(one_side.clone(), Scale::Absolute, &options, &silent).unwrap();
+        let grid = filled.dense.grid;
+        let off = (0..grid.n_cells()).filter_map(|cell| {
+            let (light, view) = grid.light_and_view(cell);
+            let (light, view) = (grid.direction(light), grid.direction(view));
+            let is_there = light.phi_deg() > 195.0
+                && (15.0..=60.0).contains(&light.theta_deg())
+                && view.theta_deg() <= 60.0;
+            let found = filled.dense.planes[0][cell] / truth(light, view, 0, 1);
+            is_there.then(|| f64::from(found).natural_log().abs())
+        });
+        off.fold(0.0, f64::max)
+    };
+    let (right, wrong) = (error(Some(0.0)), error(Some(50.0)));
+    assert!(right < 0.05 && wrong > 0.15, "{right} {wrong}");
+    for (symmetry, plane) in [
+        (SymmetryKind::HalfTurn, 0.0),
+        (SymmetryKind::Bilateral, 400.0),
+        (SymmetryKind::Bilateral, f64::NAN),
+    ] {
+        let options = FillOptions {
+            symmetry: Some(symmetry),
+            plane_deg: Some(plane),
+            ..options(false)
+        };
+        let said = options.check().unwrap_err().to_string();
+        assert!(said.starts_with("--plane"), "{said}");
+    }
+}
