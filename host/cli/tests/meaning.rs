@@ -376,10 +376,17 @@ fn values_have_uncertainties_that_hold_what_the_samples_say_of_their_rig() {
     let added = [0, 1].map(|k| directed[k][1] - noise[k][1]);
     assert!(added[0] > 3.0 * added[1], "{directed:?} {noise:?}");
 
-    let (dense, error) = (dir.path().join("d.exr"), dir.path().join("e.exr"));
+    a_grid_has_them_too(dir.path(), &scale, asked, &query);
+}
+
+/// What a question on the command line gives: values with u, and what is said.
+type Asks<'a> = &'a dyn Fn(&[&str]) -> (Vec<[f64; 2]>, String);
+
+fn a_grid_has_them_too(dir: &Path, scale: &Path, asked: &str, query: Asks) {
+    let (dense, error) = (dir.join("d.exr"), dir.join("e.exr"));
     let fill = [
         "fill",
-        text(&scale),
+        text(scale),
         "--step",
         "10",
         "-o",

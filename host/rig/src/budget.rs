@@ -166,7 +166,9 @@ mod tests {
     fn a_budget_comes_back_from_its_record_and_a_wrong_record_is_named() {
         let rig = Rig::paper(400);
         let known = ReferenceCalibration::KnownReference;
-        let budget = Budget::new(known, 0.315, [1100.0, 1800.0, 14.0], |input| input.of(&rig));
+        let budget = Budget::new(known, 0.315, [1100.0, 1800.0, 14.0], |input| {
+            rig.input(input)
+        });
         let budget = budget.with(Input::Drift, 0.001);
         let text = budget.to_string();
         assert_eq!(text.parse(), Ok(budget));

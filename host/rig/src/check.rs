@@ -35,7 +35,8 @@ pub fn check_rig(rig: &Rig) -> Result<(), RigError> {
             check_reflectance(rho)?;
         }
     }
-    check_uncertainties(rig)?;
+    let stated = rig.uncertainty.unwrap_or_default();
+    check_uncertainties(rig.reference.as_ref(), &stated)?;
     if let Some(sensor) = &rig.sensor {
         check_sensor(sensor)?;
     }

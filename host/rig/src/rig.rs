@@ -6,7 +6,7 @@ use crate::bench_setup::{ArmPorts, SessionSettings, Source};
 use crate::calibration::Calibration;
 use crate::reference::Reference;
 use crate::sensor::Sensor;
-use crate::uncertainty::Uncertainties;
+use crate::uncertainty::{Input, KnownFrom, Uncertainties};
 use gonia_brdf::Direction;
 use serde::{Deserialize, Serialize};
 
@@ -230,5 +230,13 @@ impl Rig {
         light
             .arm
             .placement(reading, distance_mm, &self.target.place)
+    }
+
+    /// What is known of an input of the measurement equation, but for what the calibration says of directions.
+    pub fn input(&self, input: Input) -> (f64, KnownFrom) {
+        input.of(
+            self.reference.as_ref(),
+            &self.uncertainty.unwrap_or_default(),
+        )
     }
 }

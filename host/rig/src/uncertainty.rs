@@ -3,9 +3,9 @@
 //! `rig.toml` states them in `[reference]` and `[uncertainty]`; those that it leaves out have deliberately
 //! cautious defaults. All are standard uncertainties (k = 1). The equation itself is `gonia_pipeline::budget`.
 
+use crate::reference::Reference;
 use crate::reference::Reflectance;
 use crate::rig_error::{RigError, within};
-use crate::{Reference, Rig};
 use serde::{Deserialize, Serialize};
 
 /// `[uncertainty]` of `rig.toml`; what is left out has its default ([`Input::default_value`]).
@@ -157,9 +157,8 @@ impl Input {
     }
 
     /// What the file states of it.
-    fn stated(self, rig: &Rig) -> Option<f64> {
-        let certificate = rig.reference.as_ref().map(|of| &of.certificate);
-        let keys = rig.uncertainty.unwrap_or_default();
+    fn stated(self, reference: Option<&Reference>, keys: &Uncertainties) -> Option<f64> {
+        let certificate = reference.map(|of| &of.certificate);
         match self {
             Self::Reference => certificate?.u,
             Self::ReferenceAngle => certificate?.u_angle,
@@ -176,12 +175,12 @@ impl Input {
         }
     }
 
-    /// Its value in a rig, but for what a calibration says of directions.
-    pub fn of(self, rig: &Rig) -> (f64, KnownFrom) {
-        match self.stated(rig) {
+    /// Its value in a rig with this reference that states this, but for what a calibration says of directions.
+    pub fn of(self, reference: Option<&Reference>, keys: &Uncertainties) -> (f64, KnownFrom) {
+        match self.stated(reference, keys) {
             Some(value) => (value, KnownFrom::Stated),
             // A table holds the angles.
-            None if self == Self::ReferenceAngle && is_tabled(rig.reference.as_ref()) => {
+            None if self == Self::ReferenceAngle && is_tabled(reference) => {
                 (0.0, KnownFrom::Stated)
             }
             None => (self.default_value(), KnownFrom::Default),
@@ -216,13 +215,16 @@ fn is_tabled(reference: Option<&Reference>) -> bool {
 }
 
 /// Checks what a rig states of its uncertainties.
-pub(crate) fn check_uncertainties(rig: &Rig) -> Result<(), RigError> {
+pub(crate) fn check_uncertainties(
+    reference: Option<&Reference>,
+    keys: &Uncertainties,
+) -> Result<(), RigError> {
     for input in Input::ALL {
-        if let Some(value) = input.stated(rig) {
+        if let Some(value) = input.stated(reference, keys) {
             input.check(value)?;
         }
     }
-    let certificate = rig.reference.as_ref().map(|of| &of.certificate);
+    let certificate = reference.map(|of| &of.certificate);
     match certificate.and_then(|of| of.valid_until.as_deref()) {
         Some(day) if !is_day(day) => Err(RigError::new(
             "reference.valid_until",
@@ -260,15 +262,15 @@ fn is_day(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Certificate, check_rig};
+    use crate::reference::Certificate;
 
-    fn rig(certificate: Certificate, keys: Uncertainties) -> Rig {
-        let mut rig = Rig::paper(400);
+    fn with_u(u: f64) -> Reference {
         let mut reference = Reference::lambertian([0.99; 3]);
-        reference.certificate = certificate;
-        rig.reference = Some(reference);
-        rig.uncertainty = Some(keys);
-        rig
+        reference.certificate = Certificate {
+            u: Some(u),
+            ..Certificate::default()
+        };
+        reference
     }
 
     #[test]
@@ -281,38 +283,35 @@ mod tests {
 
     #[test]
     fn an_uncertainty_of_zero_or_above_one_is_refused_and_the_default_named() {
+        let none = Uncertainties::default();
+        assert_eq!(check_uncertainties(Some(&with_u(0.004)), &none), Ok(()));
         for wrong in [0.0, -0.1, 1.5, f64::NAN] {
-            let of = Certificate {
-                u: Some(wrong),
-                ..Certificate::default()
-            };
-            let error = check_rig(&rig(of, Uncertainties::default())).unwrap_err();
+            let error = check_uncertainties(Some(&with_u(wrong)), &none).unwrap_err();
             assert_eq!(error.key, "reference.u");
             assert!(error.remedy.contains("default of 0.02"), "{error}");
             let keys = Uncertainties {
                 drift: Some(wrong),
-                ..Uncertainties::default()
+                ..none
             };
-            let error = check_rig(&rig(Certificate::default(), keys)).unwrap_err();
+            let error = check_uncertainties(None, &keys).unwrap_err();
             assert_eq!(error.key, "uncertainty.drift");
         }
     }
 
     #[test]
     fn what_is_stated_is_used_and_what_is_not_has_its_default() {
-        let of = Certificate {
-            u: Some(0.004),
-            ..Certificate::default()
-        };
-        let mut rig = rig(of, Uncertainties::default());
-        assert_eq!(Input::Reference.of(&rig), (0.004, KnownFrom::Stated));
-        assert_eq!(Input::Drift.of(&rig), (0.005, KnownFrom::Default));
-        assert_eq!(Input::ReferenceAngle.of(&rig), (0.2, KnownFrom::Default));
-        rig.reference = Some(Reference::from(Reflectance::Table {
+        let none = Uncertainties::default();
+        let reference = with_u(0.004);
+        let of = |input: Input, reference| input.of(Some(reference), &none);
+        assert_eq!(of(Input::Reference, &reference), (0.004, KnownFrom::Stated));
+        assert_eq!(of(Input::Drift, &reference), (0.005, KnownFrom::Default));
+        let by_angle = of(Input::ReferenceAngle, &reference);
+        assert_eq!(by_angle, (0.2, KnownFrom::Default));
+        let tabled = Reference::from(Reflectance::Table {
             file: "white.csv".into(),
-            table: crate::ReflectanceTable::ByIncidence(Vec::new()),
-        }));
-        assert_eq!(Input::ReferenceAngle.of(&rig).0, 0.0);
+            table: crate::reference::ReflectanceTable::ByIncidence(Vec::new()),
+        });
+        assert_eq!(of(Input::ReferenceAngle, &tabled).0, 0.0);
     }
 
     #[test]

@@ -100,7 +100,8 @@ fn at_rest(bus: DriverBus, strike: fn(&mut DriverChip)) -> TestBench {
 
 #[test]
 fn every_trouble_of_a_driver_is_a_fault_of_its_own() {
-    let rows: [(fn(&mut DriverChip), FaultCode); 5] = [
+    type Spoils = fn(&mut DriverChip);
+    let rows: [(Spoils, FaultCode); 5] = [
         (
             |chip| chip.trouble = DriverTrouble::Silent,
             FaultCode::DRIVER_SILENT,

@@ -270,7 +270,7 @@ mod tests {
         let rig = Rig::paper(100);
         let known = ReferenceCalibration::KnownReference;
         let lengths = [1100.0, 1800.0, 14.0];
-        let budget = Budget::new(known, 0.3, lengths, |input| input.of(&rig));
+        let budget = Budget::new(known, 0.3, lengths, |input| rig.input(input));
         budget.with(Input::LightDiameter, 100.0)
     }
 

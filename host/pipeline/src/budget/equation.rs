@@ -222,7 +222,7 @@ impl Equation {
             effects[effect as usize] = self.inputs[effect as usize] * sensitivity;
         };
         let departs = |slant: &Slant| (1.0 - slant.cosine).powi(2);
-        let tangent = light.tangent[0].hypot(light.tangent[1]);
+        let tangent = light.tangent[0].hypotenuse(light.tangent[1]);
         let mut light_slope = slopes[0] * per_value;
         if self.is_absolute {
             set(Effect::Reference, 1.0);
@@ -290,7 +290,7 @@ mod tests {
 
     /// Where a direction truly is that is off by so much along and across its meridian.
     fn off(direction: Vec3, [along, across]: [f64; 2]) -> Vec3 {
-        let flat = direction[0].hypot(direction[1]);
+        let flat = direction[0].hypotenuse(direction[1]);
         let across_unit = [-direction[1] / flat, direction[0] / flat, 0.0];
         let along_unit = [
             direction[2] * direction[0] / flat,
@@ -436,7 +436,7 @@ mod tests {
             ReferenceCalibration::KnownReference,
             LEVEL,
             lengths,
-            |input| input.of(&rig),
+            |input| rig.input(input),
         )
         .with(Input::LightDiameter, 90.0)
         .with(Input::LensDiameter, 30.0);

@@ -54,7 +54,7 @@ pub fn budget_of(rig: &Rig, calibration: ReferenceCalibration, samples: &[Sample
             Input::ViewDirection => view,
             _ => None,
         };
-        match (input.of(rig), found) {
+        match (rig.input(input), found) {
             ((_, KnownFrom::Default), Some(u)) => (u, KnownFrom::Calibration),
             (known, _) => known,
         }

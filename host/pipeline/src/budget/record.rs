@@ -41,7 +41,7 @@ mod tests {
     fn of_several_sets_of_samples_each_inputs_largest_counts() {
         let rig = Rig::paper(100);
         let known = ReferenceCalibration::KnownReference;
-        let budget = Budget::new(known, 0.3, [1.0; 3], |input| input.of(&rig));
+        let budget = Budget::new(known, 0.3, [1.0; 3], |input| rig.input(input));
         let (a, b) = (
             budget.clone().with(Input::Drift, 0.05),
             budget.with(Input::Reference, 0.07),
