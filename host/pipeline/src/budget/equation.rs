@@ -116,11 +116,17 @@ impl Effects {
 
     /// The relative standard uncertainty of a part.
     pub fn u(&self, part: Part) -> f64 {
-        let squares = Effect::ALL
-            .into_iter()
-            .filter(|effect| effect.part() == part)
-            .map(|effect| self.of(effect).powi(2));
-        squares.sum::<f64>().sqrt()
+        // Those of the scale come first.
+        let (scale, direction) = self.0.split_at(Effect::LightTheta as usize);
+        let of_part = match part {
+            Part::Scale => scale,
+            Part::Direction => direction,
+        };
+        of_part
+            .iter()
+            .map(|share| share * share)
+            .sum::<f64>()
+            .sqrt()
     }
 
     /// Adds another's, effect by effect, times a weight: an error acts in all cells alike.
@@ -148,8 +154,12 @@ pub struct Shape {
 #[derive(Clone, Copy, Debug)]
 pub struct Slant {
     cosine: f64,
-    /// tan θ times cos φ and sin φ.
+    per_cosine: f64,
+    /// tan θ, and times cos φ and sin φ.
+    slope: f64,
     tangent: [f64; 2],
+    /// (1 − cos θ)².
+    departs: f64,
 }
 
 /// A light that grazes is held here: its tangent has no end.
@@ -161,10 +171,13 @@ impl Slant {
         let (sine, cosine) = direction.theta_deg().to_radians().sine_cosine();
         let cosine = cosine.max(LEAST_COSINE);
         let (sin_phi, cos_phi) = direction.phi_deg().to_radians().sine_cosine();
-        let tangent = sine / cosine;
+        let slope = sine / cosine;
         Self {
             cosine,
-            tangent: [tangent * cos_phi, tangent * sin_phi],
+            per_cosine: 1.0 / cosine,
+            slope,
+            tangent: [slope * cos_phi, slope * sin_phi],
+            departs: (1.0 - cosine).powi(2),
         }
     }
 }
@@ -221,25 +234,23 @@ impl Equation {
         let mut set = |effect: Effect, sensitivity: f64| {
             effects[effect as usize] = self.inputs[effect as usize] * sensitivity;
         };
-        let departs = |slant: &Slant| (1.0 - slant.cosine).powi(2);
-        let tangent = light.tangent[0].hypotenuse(light.tangent[1]);
         let mut light_slope = slopes[0] * per_value;
         if self.is_absolute {
             set(Effect::Reference, 1.0);
-            set(Effect::ReferenceAngle, departs(light) + departs(view));
+            set(Effect::ReferenceAngle, light.departs + view.departs);
             set(Effect::ReferenceTiltX, light.tangent[0]);
             set(Effect::ReferenceTiltY, light.tangent[1]);
             // Of cos θ/d² at a point that is nearer to the light.
-            let nearer = (3.0 * light.cosine - 1.0 / light.cosine) / self.light_mm;
+            let nearer = (3.0 * light.cosine - light.per_cosine) / self.light_mm;
             set(Effect::ReferenceHeight, nearer);
             set(Effect::Drift, 1.0);
         } else {
             // No reference at the same pose takes the light's cosine out.
-            light_slope -= tangent;
+            light_slope -= light.slope;
         }
         let bright = self.level * per_value;
         set(Effect::Linearity, -bright.decimal_log());
-        set(Effect::Offset, (bright - 1.0) / light.cosine);
+        set(Effect::Offset, (bright - 1.0) * light.per_cosine);
         set(Effect::StrayLight, surround * per_value - 1.0);
         set(Effect::LightTheta, light_slope);
         set(Effect::LightPhi, slopes[1] * per_value);
