@@ -84,7 +84,7 @@ impl Query {
                     return self.ask_fit(&fit, &names.join(" "), &provenance);
                 }
                 Behind::Missing(samples) => errln!(
-                    "asked: the grid, linear between its nodes; {}, whose fit it is, is not there",
+                    "evaluated: the grid, linear between its nodes; {}, whose fit it is, is not there",
                     samples.display()
                 ),
                 Behind::Other(remark) => remarks::print(&[remark]),
@@ -160,7 +160,7 @@ impl Query {
     fn ask_fit(&self, fit: &FitOfSamples, samples: &str, provenance: &Provenance) -> Result<()> {
         let choice = fit.choice();
         errln!(
-            "asked: the fit of {samples}; {} ({})",
+            "evaluated: the fit of {samples}; {} ({})",
             choice.settings,
             choice.reason
         );

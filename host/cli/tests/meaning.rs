@@ -449,11 +449,11 @@ fn a_dense_brdf_of_few_samples_is_asked_by_their_fit_and_its_grid_where_they_are
     let (printed, _, said) = query(&[text(&dense)]);
     assert_eq!(printed, of_samples);
     assert!(
-        said.contains("asked: the fit of") && said.contains("peak.csv"),
+        said.contains("evaluated: the fit of") && said.contains("peak.csv"),
         "{said}"
     );
     let (of_grid, off, said) = query(&[text(&dense), "--grid"]);
-    assert!(off > 0.5 && !said.contains("asked"), "{off} {said}");
+    assert!(off > 0.5 && !said.contains("evaluated"), "{off} {said}");
     // The same values times 1.5, with what was said of them.
     let mut file = read_dense_channels(&dense).unwrap();
     file.planes[0].iter_mut().for_each(|value| *value *= 1.5);
