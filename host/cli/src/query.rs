@@ -16,12 +16,12 @@ use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Reads directions from standard input (a table with the columns theta_i, phi_i, theta_v, phi_v, in
-/// degrees) and writes them with r, g, b (or Y, or 380nm, ...: the channels that there are): of samples as a fit to
-/// them has it at the very directions; of a dense BRDF the same where its values are a fit of few samples and these
-/// are still there, else interpolated between the nodes.
+/// degrees) and writes them with r, g, b (or Y, or 380nm, ...: the channels that there are). A fit of samples is
+/// evaluated at these directions. A dense BRDF is interpolated between its nodes, or its fit is evaluated, if it was
+/// made from few samples that are still there.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nOf samples (.npy, .npz, .csv, .txt, .tsv; at most a million) no grid comes in between: a peak that is narrower than\na grid's step is kept. gonia fill leaves in DENSE.exr where its samples are, and their checksum: they are looked for\nthere and beside it. What is asked, the fit or the grid, and what symmetry was taken of samples, is printed on standard error.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
+    after_long_help = "Example:\n  printf 'theta_i,phi_i,theta_v,phi_v\\n30,45,60,225\\n' | gonia query dense.exr\n\nSamples (.npy, .npz, .csv, .txt, .tsv; at most a million) are fitted without a grid: a peak that is narrower than\na grid's step is kept. DENSE.exr holds the path of its samples and their checksum; gonia looks for them there and\nbeside it. Standard error names what was evaluated (fit or grid), and the symmetry of the fit.\n\nA grid ends at 86 degrees or before: a direction beyond its last polar angle has the value there, and\na warning on standard error counts such directions. The rows stay the same."
 )]
 pub struct Query {
     /// The dense BRDF, or the samples themselves

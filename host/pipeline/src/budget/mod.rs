@@ -37,7 +37,9 @@ pub use summary::{StratumBudget, summary};
 
 use directions::direction_u;
 use gonia_brdf::{Pose, Sample};
-use gonia_rig::{Budget, Input, KnownFrom, ReferenceCalibration, Rig};
+use gonia_rig::{
+    Budget, Input, KnownFrom, ReferenceCalibration, Reflectance, ReflectanceTable, Rig,
+};
 use std::f64::consts::PI;
 
 /// Name of the fact in the provenance of samples and dense BRDFs that is their [`Budget`].
@@ -92,8 +94,15 @@ fn level(rig: &Rig, calibration: ReferenceCalibration, samples: &[Sample]) -> f6
     let sum = |values: [f64; 3]| values.iter().sum::<f64>() / 3.0;
     let known = match (&rig.reference, calibration) {
         (Some(reference), ReferenceCalibration::KnownReference) => match &reference.reflectance {
-            gonia_rig::Reflectance::Lambertian(rho) => Some(sum(*rho) / PI),
-            gonia_rig::Reflectance::Table { .. } => Some(1.0 / PI),
+            Reflectance::Lambertian(rho) => Some(sum(*rho) / PI),
+            Reflectance::Table { table, .. } => {
+                let factors: Vec<f64> = match table {
+                    ReflectanceTable::ByIncidence(rows) => rows.iter().map(|r| sum(r.1)).collect(),
+                    ReflectanceTable::ByPose(rows) => rows.iter().map(|r| sum(r.1)).collect(),
+                };
+                let n = factors.len() as f64;
+                (n > 0.0).then(|| factors.iter().sum::<f64>() / n / PI)
+            }
         },
         _ => None,
     };
@@ -106,4 +115,27 @@ fn level(rig: &Rig, calibration: ReferenceCalibration, samples: &[Sample]) -> f6
     };
     // Of samples that are all zero or below, nothing can be a share.
     known.unwrap_or_else(mean).max(f64::from(f32::MIN_POSITIVE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gonia_rig::Reference;
+
+    #[test]
+    fn a_grey_references_table_is_the_level_that_counts_are_compared_at() {
+        let mut rig = Rig::paper(100);
+        rig.reference = Some(Reference::from(Reflectance::Table {
+            file: "grey.csv".into(),
+            table: ReflectanceTable::ByIncidence(vec![(8.0, [0.2; 3]), (60.0, [0.1; 3])]),
+        }));
+        let known = budget_of(&rig, ReferenceCalibration::KnownReference, &[]);
+        assert!((known.level - 0.15 / PI).abs() < 1e-12, "{}", known.level);
+        // Without a known reference it is the samples' mean.
+        let [light, view] = [10.0, 20.0].map(|deg| gonia_brdf::Direction::from_deg(deg, 0.0));
+        let sample = |value: f32| Sample::new(light, view, [value; 3]);
+        let relative = ReferenceCalibration::GeometricModel;
+        let mean = budget_of(&rig, relative, &[sample(0.2), sample(0.4)]).level;
+        assert!((mean - 0.3).abs() < 1e-6, "{mean}");
+    }
 }
