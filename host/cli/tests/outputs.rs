@@ -533,13 +533,6 @@ fn exports(bench: &mut Bench) {
             "there is no such format; give --format rgl",
         ),
         (
-            "`export -o a.bsdf --assume-scale 2` of a grid of 30°",
-            "@a.bsdf",
-            &["--assume-scale", "2"],
-            0,
-            "the file looks finer than it is",
-        ),
-        (
             "`export -o a.xml --error ERR.exr`",
             "@a.xml",
             &["--assume-scale", "2", "--error", "@a.exr"],
@@ -551,7 +544,7 @@ fn exports(bench: &mut Bench) {
             "@a.nc",
             &[],
             0,
-            "|ln| median 0.0000, p99 0.0000",
+            "nothing (60 degrees is the table's last)",
         ),
         (
             "`export -o a.nc --format zarr` over a file",
