@@ -1,9 +1,8 @@
 //! The table of all formats, and how a file's format is recognised.
 
+use crate::export::{radiance, zemax};
 use crate::format::{Content, Format};
-use crate::{
-    FileError, dense_exr, export, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia,
-};
+use crate::{FileError, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -18,8 +17,8 @@ static FORMATS: [&Format; 10] = [
     &merl::FORMAT,
     &ngan::FORMAT,
     &rgl::FORMAT,
-    &export::radiance::FORMAT,
-    &export::zemax::FORMAT,
+    &radiance::FORMAT,
+    &zemax::FORMAT,
 ];
 
 /// The formats of a kind, in the order of the table.

@@ -107,7 +107,17 @@ pub fn dataset<'a>(dense: &'a DenseChannels, errors: Option<&'a DenseChannels>) 
         attributes,
         data: Data::Planes(&dense.planes),
     });
-    let mut attributes = texts(&[
+    let mut attributes = of_the_whole(dense);
+    attributes.extend(provenance(dense));
+    Dataset {
+        shape: [dense.channels.count(), n_theta, n_phi, n_theta, n_phi],
+        attributes,
+        arrays,
+    }
+}
+
+fn of_the_whole(dense: &DenseChannels) -> Vec<(String, String)> {
+    texts(&[
         ("Conventions", "CF-1.11"),
         ("title", "anisotropic BRDF on a lattice of directions"),
         (
@@ -115,13 +125,7 @@ pub fn dataset<'a>(dense: &'a DenseChannels, errors: Option<&'a DenseChannels>) 
             "polar angles from the sample's normal, azimuths anticlockwise from its x axis seen from above; both directions point away from the surface",
         ),
         ("scale", &dense.scale.to_string()),
-    ]);
-    attributes.extend(provenance(dense));
-    Dataset {
-        shape: [dense.channels.count(), n_theta, n_phi, n_theta, n_phi],
-        attributes,
-        arrays,
-    }
+    ])
 }
 
 /// What a name of the provenance begins with.

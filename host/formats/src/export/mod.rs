@@ -5,7 +5,7 @@
 
 mod dataset;
 mod folder;
-mod format;
+pub(crate) mod format;
 #[cfg(test)]
 mod lopsided;
 mod merl;

@@ -110,7 +110,12 @@ fn header_from(data: &Dataset<'_>, length: u64) -> Vec<u8> {
             let at = AXES.iter().position(|name| name == axis);
             put_u32(&mut out, at.unwrap_or(AXES.len()) as u32);
         }
-        put_attributes(&mut out, &array.attributes);
+        let mut attributes = array.attributes.clone();
+        if kind == CHAR {
+            // Without it readers have bytes, not text.
+            attributes.push(("_Encoding".to_owned(), "utf-8".to_owned()));
+        }
+        put_attributes(&mut out, &attributes);
         put_u32(&mut out, kind);
         let size = size_of(array, data.shape).next_multiple_of(4);
         put_u32(&mut out, u32::try_from(size).unwrap_or(u32::MAX));

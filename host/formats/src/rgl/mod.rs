@@ -11,7 +11,7 @@ mod tensor_file;
 mod warp;
 mod write;
 
-use crate::export::{ExportFormat, Holds, How, Meaning, Resolution};
+use crate::export::format::{ExportFormat, Holds, How, Meaning, Resolution};
 use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_rig::Scale;
 
@@ -59,7 +59,7 @@ pub(super) static EXPORT: ExportFormat = ExportFormat {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::ExportSettings;
+    use crate::export::format::ExportSettings;
     use gonia_brdf::direction::Vec3;
     use gonia_brdf::{Brdf, DenseBrdf, Direction, Elementary, Grid};
     use gonia_rig::DenseFile;
