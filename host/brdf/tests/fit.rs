@@ -6,7 +6,7 @@
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::fit::{
     Cell, FitSettings, FittedModel, ModelFamily, ParameterValues, Range, StandardFamily, draw,
-    draw_measured, fit,
+    draw_measured, fit, uncertainties_with_shared,
 };
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
 use gonia_brdf::interpolate;
@@ -190,6 +190,36 @@ fn parameters_come_back_within_two_per_cent_from_noisy_tables() {
             );
         }
         assert!(found.uncertainties.iter().all(Option::is_some));
+    }
+}
+
+#[test]
+fn an_error_that_all_values_share_is_one_of_the_amplitudes_and_of_no_angle() {
+    let grid = Grid::with_step_deg(6.0).unwrap();
+    let settings = FitSettings {
+        cells: 2000,
+        starts: 4,
+        ..FitSettings::default()
+    };
+    let case = &cases()[2];
+    let dense = noisy(case.family.model(&case.truth).unwrap().as_ref(), grid);
+    let cells = draw(&dense, settings.cells, settings.seed);
+    let found = fit(&cells, case.family, &settings, &silent).unwrap();
+    let of = |share: f64| {
+        let shared = vec![vec![[share; 3]; cells.len()]];
+        uncertainties_with_shared(&found, &cells, settings.loss, &shared).unwrap()
+    };
+    assert_eq!(of(0.0), found.uncertainties);
+    let (alone, shared) = (&found.uncertainties, of(0.05));
+    for (k, p) in case.family.parameters().iter().enumerate() {
+        let [alone, shared] = [alone[k].unwrap(), shared[k].unwrap()];
+        let added = (shared * shared - alone * alone).max(0.0).sqrt();
+        let share = added / found.values[k].abs();
+        if p.is_amplitude {
+            assert!((share - 0.05).abs() < 0.002, "{}: {share}", p.name);
+        } else {
+            assert!(added < 0.3 * alone, "{}: {alone} {shared}", p.name);
+        }
     }
 }
 

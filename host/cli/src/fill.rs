@@ -14,8 +14,10 @@ use gonia_formats::dense::{
 use gonia_formats::fit_source::files_of_samples;
 use gonia_formats::samples::read_channels_of_all;
 use gonia_formats::{check_output, checksum, is_same_file};
-use gonia_pipeline::budget::{StratumBudget, summary};
-use gonia_pipeline::budget::{UNCERTAINTIES, budget_in, combine_errors};
+use gonia_pipeline::budget::{
+    CellBudget, Holding, StratumBudget, UNCERTAINTIES, albedo_uncertainty, budget_in,
+    combine_errors, summary,
+};
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{DirectionalAlbedo, FillAccount, FillMethod, FillOptions, fill, fill_to_file};
 use gonia_rig::{Budget, Channels, DenseChannels, SampleValues, Scale};
@@ -175,12 +177,12 @@ impl Fill {
         remarks::print(&filled.account.remarks);
         let budget = budget_in(&facts)?;
         let mut file = filled.dense;
+        file.provenance.extend(facts);
         let mut error_facts = file.provenance.clone();
         if self.error.is_some() {
             let of = checksum::of_channels(&file);
             error_facts.insert(ERRORS_OF.to_owned(), of);
         }
-        file.provenance.extend(facts);
         progress.stage("writing the dense BRDF", |_| {
             write_dense_channels(&self.output, &file)
         })?;
@@ -189,7 +191,7 @@ impl Fill {
             uncertainty = uncertainty_rows(&file, &bars, budget.as_ref());
             let combine = budget.as_ref().and_then(|budget| {
                 error_facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
-                combine_errors(&file, budget)
+                combine_errors(file.grid, &file.planes, budget)
             });
             let combine = combine
                 .as_ref()
@@ -245,11 +247,23 @@ fn uncertainty_rows(
         let alone = "noise and interpolation alone: the samples say nothing of their rig";
         return vec![("error bars hold".to_owned(), alone.to_owned())];
     };
+    let middle = dense.planes.len() / 2;
+    let of_middle = dense
+        .planes
+        .get(middle)
+        .zip(errors.standard_error.get(middle));
+    let cells = of_middle.and_then(|(plane, noise)| {
+        let noise = (&noise[..], Holding::Noise);
+        CellBudget::new(dense.grid, plane, noise, &errors.origin, budget)
+    });
+    let Some(cells) = cells else {
+        return Vec::new();
+    };
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let row = |of: &StratumBudget| {
         let largest = of.sorted().into_iter().take(3);
         let largest: Vec<String> = largest
-            .map(|(name, u)| format!("{name} {}", percent(u)))
+            .map(|(part, u)| format!("{} {}", part.name(), percent(u)))
             .collect();
         (
             format!("u (k = 1), {}", of.stratum),
@@ -260,7 +274,22 @@ fn uncertainty_rows(
             ),
         )
     };
-    summary(dense, errors, budget).iter().map(row).collect()
+    let mut rows: Vec<(String, String)> = summary(&cells).iter().map(row).collect();
+    let albedos: Vec<String> = [0.0, 30.0, 60.0]
+        .map(|theta| albedo_uncertainty(&cells, theta))
+        .iter()
+        .map(|of| format!("{:.3} ± {:.3}", of.albedo, 2.0 * of.u))
+        .collect();
+    let name = dense.channels.names().get(middle).cloned();
+    rows.push((
+        "albedo and U (k = 2)".to_owned(),
+        format!(
+            "{} ({} at theta_i 0, 30, 60)",
+            albedos.join(", "),
+            name.unwrap_or_default()
+        ),
+    ));
+    rows
 }
 
 /// Where the cells' values come from.

@@ -5,7 +5,8 @@ use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Direction, Grid};
-use gonia_formats::dense::DenseLookup;
+use gonia_formats::checksum;
+use gonia_formats::dense::{DenseLookup, ERRORS_OF, read_dense_channels};
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
 use gonia_formats::samples::read_channels;
 use gonia_pipeline::budget::budget_in;
@@ -128,12 +129,20 @@ impl Query {
             return Ok(None);
         };
         let errors = DenseLookup::open(path)?;
-        if errors.grid() != brdf.grid() || errors.channels() != brdf.channels() {
+        let refuse = |found: &str| {
             bail!(
-                "--error {}: has another grid or other channels than {}; give the error bars that were written with it",
+                "--error {}: {found} {}; give the error bars that were written with it (gonia fill --error)",
                 path.display(),
                 self.dense.display()
-            );
+            )
+        };
+        if errors.grid() != brdf.grid() || errors.channels() != brdf.channels() {
+            return refuse("has another grid or other channels than");
+        }
+        // They hold the checksum of the values that they are of.
+        let of = errors.provenance().get(ERRORS_OF);
+        if of != Some(&checksum::of_channels(&read_dense_channels(&self.dense)?)) {
+            return refuse("is not of the values of");
         }
         Ok(Some(errors))
     }

@@ -403,6 +403,27 @@ fn a_grid_has_them_too(dir: &Path, scale: &Path, asked: &str, query: Asks) {
     for [value, u] in by_grid {
         assert!(u > 0.05 * value && u < 0.2 * value, "{value} {u}");
     }
+    assert!(printed.contains("albedo and U (k = 2)"), "{printed}");
+    // Error bars of other values are none of these.
+    let other = dir.join("other.exr");
+    let scaled: String = std::fs::read_to_string(scale).unwrap();
+    let (head, rows) = scaled.split_once("brdf\n").unwrap();
+    let rows = rows.lines().map(|row| {
+        let (angles, value) = row.rsplit_once(',').unwrap();
+        format!("{angles},{}\n", 1.5 * value.parse::<f64>().unwrap())
+    });
+    let samples = dir.join("other.csv");
+    std::fs::write(
+        &samples,
+        format!("{head}brdf\n{}", rows.collect::<String>()),
+    )
+    .unwrap();
+    let fill = ["fill", text(&samples), "--step", "10", "-o", text(&other)];
+    assert_eq!(gonia(&fill, "").status.code(), Some(0));
+    let output = gonia(&["query", text(&other), "--error", text(&error)], asked);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("is not of the values of"), "{said}");
     let output = gonia(&["query", text(&dense), "--uncertainty", "--grid"], asked);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");

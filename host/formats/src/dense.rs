@@ -6,7 +6,7 @@ use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
 pub use crate::format::{
     ChannelErrors, CombineErrors, ERROR_PARTS, ErrorRow, MakeRows, RowsNote, TakeRow,
 };
-use crate::{FileError, table};
+use crate::{FileError, error_exr, table};
 use gonia_brdf::{Direction, Grid};
 use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
 use std::collections::BTreeMap;
@@ -90,6 +90,15 @@ pub fn write_error_bars(
     provenance: &BTreeMap<String, String>,
 ) -> Result<(), FileError> {
     (writer_of_name(path)?.error_bars)(path, grid, bars, combine, scale, provenance)
+}
+
+/// The cells' origins of a file of standard errors ([`write_error_bars`]), in the grid's order; `None` where it holds
+/// none.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn read_origins(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
+    error_exr::read_origins(path)
 }
 
 /// Endings that people take for another kind of file than the one that would be written.

@@ -5,7 +5,8 @@ use crate::exr_planes::{ExrPlanes, Plane};
 use crate::exr_rows::write_rows;
 use crate::format::{ChannelErrors, CombineErrors, ERROR_PARTS};
 use crate::{FileError, exr_planes};
-use exr::prelude::f16;
+use exr::meta::MetaData;
+use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use gonia_brdf::Grid;
 use gonia_rig::{Channels, Scale};
 use rayon::prelude::*;
@@ -118,10 +119,48 @@ fn write_rows_of(
     })
 }
 
+/// The cells' origins of a file of standard errors, in the grid's order; `None` where it holds none.
+///
+/// # Errors
+/// A file that is no EXR or cannot be read.
+pub(super) fn read_origins(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
+    let names = MetaData::read_from_file(path, false).map_err(|error| reading(path, &error))?;
+    let has_origins = names.headers.iter().any(|header| {
+        let mut channels = header.channels.list.iter();
+        channels.any(|channel| channel.name.eq(ORIGIN))
+    });
+    if !has_origins {
+        return Ok(None);
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required(ORIGIN)
+        .collect_pixels(
+            |size, _| (size.width(), vec![0; size.area()]),
+            |(width, origins): &mut (usize, Vec<u8>), place, (origin,): (f32,)| {
+                origins[place.y() * *width + place.x()] = origin as u8;
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|error| reading(path, &error))?;
+    Ok(Some(image.layer_data.channel_data.pixels.1))
+}
+
+fn reading(path: &Path, error: &exr::error::Error) -> FileError {
+    FileError::new(
+        path,
+        format_args!("cannot be read as OpenEXR ({error})"),
+        "make it again (gonia fill --error)",
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::prelude::{ReadChannels, ReadLayers};
 
     #[test]
     fn errors_and_origin_stand_where_their_cells_are() {
@@ -171,6 +210,13 @@ mod tests {
             assert_eq!(value("G", k), (k + 1) as f32);
             assert_eq!(value("origin", k), (k % 4) as f32);
         }
+        let expected: Vec<u8> = (0..n).map(|k| (k % 4) as u8).collect();
+        for path in [&path, &of_bands] {
+            assert_eq!(read_origins(path).unwrap(), Some(expected.clone()));
+        }
+        let values = folder.path().join("dense.exr");
+        crate::dense::write_dense_channels(&values, &read).unwrap();
+        assert_eq!(read_origins(&values).unwrap(), None);
     }
 
     #[test]

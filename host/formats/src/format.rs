@@ -77,6 +77,7 @@ pub type MakeRows<'a> = &'a mut dyn FnMut(&TakeRow<'_>) -> io::Result<()>;
 pub type TakeRow<'a> = dyn Fn(usize, &[usize], &[&[f32]]) -> io::Result<()> + Sync + 'a;
 
 /// Standard errors of a dense BRDF of any channels.
+#[derive(Clone, Debug, PartialEq)]
 pub struct ChannelErrors {
     /// What the planes are of.
     pub channels: Channels,

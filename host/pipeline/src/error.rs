@@ -6,7 +6,7 @@ use crate::progress::Cancelled;
 use gonia_brdf::fit::FitError;
 use gonia_brdf::interpolate::FillError;
 use gonia_formats::FileError;
-use gonia_rig::Channels;
+use gonia_rig::{Channels, NoBudget};
 
 /// Any error of this library. Each says in one line what is wrong and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +77,9 @@ pub enum Error {
         /// The format's name.
         format: &'static str,
     },
+    /// What the data say of their uncertainties is unsound.
+    #[error(transparent)]
+    Budget(#[from] NoBudget),
     /// The caller's progress callback said so.
     #[error("cancelled")]
     Cancelled,

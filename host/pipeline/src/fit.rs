@@ -1,6 +1,7 @@
 //! A model's parameters from a dense BRDF, or from the samples behind it.
 
 use crate::Error;
+use crate::budget::{budget_in, shared_errors};
 use crate::compare::{Options, Side, Table, compare};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::of_this_program;
@@ -81,11 +82,12 @@ pub fn level_remark(dense: &DenseBrdf, cells: &[Cell], samples: &Path) -> Option
     })
 }
 
-/// Fits a model, one of gonia's or of your own, to cells, tabulates it on the grid of `measured` and compares it with that. `name` is
+/// Fits a model, one of gonia's or of your own, to cells (the uncertainties of its numbers hold what the provenance of
+/// `measured` says of its rig: [`budget`](crate::budget)), tabulates it on the grid of `measured` and compares it with that. `name` is
 /// what the figures call `measured`.
 ///
 /// # Errors
-/// No positive value to fit, or none to compare.
+/// No positive value to fit, or none to compare, or a provenance whose budget is none.
 pub fn fit_model<F: ModelFamily + Display>(
     measured: &DenseFile,
     name: &str,
@@ -96,9 +98,13 @@ pub fn fit_model<F: ModelFamily + Display>(
 ) -> Result<FitResult, Error> {
     let model_name = family.to_string();
     let start = Instant::now();
-    let fit = step(progress, Step::FittingModel, |share| {
+    let mut fit = step(progress, Step::FittingModel, |share| {
         fit::fit(cells, family, settings, share).map_err(Error::from)
     })?;
+    if let Some(budget) = budget_in(&measured.provenance)? {
+        let shared = shared_errors(&measured.brdf, &budget, cells);
+        fit.uncertainties = fit::uncertainties_with_shared(&fit, cells, settings.loss, &shared)?;
+    }
     let seconds = start.elapsed().as_secs_f64();
     let dense = step(progress, Step::Tabulating, |_| {
         // A fit always has as many parameters as its family.

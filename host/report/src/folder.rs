@@ -4,6 +4,7 @@ use crate::figures::write_figures;
 use crate::files::{DENSE, ERRORS, MEASURED, REPORT, RIG, RIVALS, RIVALS_FIGURE, SUMMARY, TRUTH};
 use crate::html::write_report;
 use crate::input::ReportInput;
+use crate::uncertainty::ErrorBars;
 use gonia_brdf::{Brdf, DenseBrdf, Grid};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::cell_mask::read_mask;
@@ -38,11 +39,7 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, Fil
     let mut owner = Owner::of(&file.brdf);
     let rig = optional(&folder.join(RIG), read_rig)?;
     let truth = table_beside(folder, TRUTH, grid)?;
-    let errors = table_beside(folder, ERRORS, grid)?;
-    let errors = errors.filter(|errors| {
-        let of = errors.provenance.get(ERRORS_OF);
-        owner.keeps(&folder.join(ERRORS), of, "gonia fill --error")
-    });
+    let errors = errors_beside(folder, grid, &mut owner)?;
     let baselines = optional(&folder.join(RIVALS), BaselineTable::read)?;
     let baselines = baselines
         .filter(|table| owner.keeps(&folder.join(RIVALS), table.dense.as_ref(), "gonia rivals"));
@@ -77,7 +74,7 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, Fil
     let input = ReportInput {
         truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
         measured: measured.as_ref(),
-        errors: errors.as_ref().map(|errors| &errors.brdf),
+        errors: errors.as_ref(),
         rig: rig.as_ref(),
         fits: &fits,
         baselines: baselines.as_ref(),
@@ -202,14 +199,38 @@ fn optional<T>(
 fn table_beside(folder: &Path, name: &str, grid: Grid) -> Result<Option<DenseFile>, FileError> {
     let path = folder.join(name);
     let file = optional(&path, read_dense)?;
-    if file.as_ref().is_some_and(|file| file.brdf.grid() != grid) {
-        return Err(FileError::new(
-            &path,
-            format_args!("is of another grid than {DENSE}"),
-            "remove it, or make it again with the same steps",
-        ));
+    if let Some(file) = &file {
+        is_of_grid(&path, file.brdf.grid(), grid)?;
     }
     Ok(file)
+}
+
+fn is_of_grid(path: &Path, found: Grid, wanted: Grid) -> Result<(), FileError> {
+    if found == wanted {
+        return Ok(());
+    }
+    Err(FileError::new(
+        path,
+        format_args!("is of another grid than {DENSE}"),
+        "remove it, or make it again with the same steps",
+    ))
+}
+
+/// The standard errors beside the dense BRDF, if they are its own.
+fn errors_beside(
+    folder: &Path,
+    grid: Grid,
+    owner: &mut Owner,
+) -> Result<Option<ErrorBars>, FileError> {
+    let path = folder.join(ERRORS);
+    let bars = optional(&path, ErrorBars::read)?;
+    if let Some(bars) = &bars {
+        is_of_grid(&path, bars.errors.grid(), grid)?;
+    }
+    Ok(bars.filter(|bars| {
+        let of = bars.provenance.get(ERRORS_OF);
+        owner.keeps(&path, of, "gonia fill --error")
+    }))
 }
 
 /// The charts of a folder, by name.

@@ -4,7 +4,9 @@ use crate::charts::{seconds, thousands};
 use crate::files::RIVALS_FIGURE;
 use crate::input::ReportInput;
 use crate::subspaces::Subspace;
-use crate::{albedo, baselines, charts, explorer, fits, panels, shots, slices, spans, subspaces};
+use crate::{
+    albedo, baselines, charts, explorer, fits, panels, shots, slices, spans, subspaces, uncertainty,
+};
 use gonia_brdf::{Brdf, Grid};
 use gonia_formats::{FileError, FrameCounts, Pointing, Summary, write_whole_bytes};
 use gonia_render::svg::STYLE;
@@ -46,6 +48,7 @@ fn page(input: &ReportInput<'_>) -> Markup {
                     (explorer::section(input.dense, unit_of(summary)))
                     (slice_sheets(input))
                     @if let Some(figures) = &summary.figures { (figures_table(figures)) }
+                    @if let Some(bars) = input.errors { (uncertainty::section(bars, input.dense, summary)) }
                     (baselines::section(input.baselines, baselines_figure(input.charts)))
                     (fits::section(input.fits))
                     (session_charts(input, grid))
@@ -247,7 +250,7 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
             @if let Some(mask) = input.measured.filter(|mask| mask.grid() == grid) {
                 (sheet(panels::measured(&slices::of_mask(mask)), "Measured bins", "the rest is interpolated"))
             }
-            @if let Some(errors) = input.errors.filter(|errors| errors.grid() == grid) {
+            @if let Some(errors) = input.errors.map(|bars| &bars.errors).filter(|errors| errors.grid() == grid) {
                 (sheet(panels::shares(&slices::relative_errors(errors, input.dense)), "Error bars",
                     "standard error as a share of the value, mean over the channels"))
             }
@@ -411,6 +414,7 @@ fn megabytes(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::uncertainty::ErrorBars;
     use gonia_brdf::DenseBrdf;
     use gonia_brdf::Elementary;
     use gonia_brdf::model::Kurt;
@@ -446,6 +450,34 @@ mod tests {
             DenseBrdf::new(grid, planes).unwrap(),
             CellMask::from_cells(grid, measured),
         )
+    }
+
+    /// Errors of noise, combined with what the rig's defaults add.
+    fn error_bars(dense: &DenseBrdf, rig: &gonia_rig::Rig) -> ErrorBars {
+        let calibration = gonia_rig::ReferenceCalibration::KnownReference;
+        let lengths = [1000.0, 1800.0, 14.0];
+        let budget = gonia_rig::Budget::new(calibration, 0.3, lengths, |input| rig.input(input));
+        let grid = dense.grid();
+        let plane = &dense.planes()[1];
+        let noise: Vec<f32> = plane.iter().map(|f| 0.01 * f).collect();
+        let holding = (&noise[..], gonia_pipeline::budget::Holding::Noise);
+        let cells =
+            gonia_pipeline::budget::CellBudget::new(grid, plane, holding, &[], &budget).unwrap();
+        let u = |cell: usize| {
+            let shares = cells.shares(cell).unwrap();
+            let square: f64 = shares.iter().map(|share| share * share).sum();
+            (square.sqrt() * f64::from(plane[cell])) as f32
+        };
+        let errors: Vec<f32> = (0..grid.n_cells()).map(u).collect();
+        let provenance = [
+            ("uncertainties".to_owned(), budget.to_string()),
+            ("reference.certificate".to_owned(), "PTB 4711".to_owned()),
+        ];
+        ErrorBars {
+            errors: DenseBrdf::new(grid, [errors.clone(), errors.clone(), errors]).unwrap(),
+            origins: Vec::new(),
+            provenance: provenance.into(),
+        }
     }
 
     fn full_summary(dense: &DenseBrdf, mask: &CellMask, truth: &dyn Brdf) -> Summary {
@@ -512,10 +544,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("report.html");
         let rig = gonia_rig::Rig::paper(400);
+        let bars = error_bars(&dense, &rig);
         let input = ReportInput {
             truth: Some(&truth),
             measured: Some(&mask),
-            errors: Some(&dense),
+            errors: Some(&bars),
             rig: Some(&rig),
             ..ReportInput::new(&summary, &dense)
         };
@@ -546,8 +579,21 @@ mod tests {
         ] {
             assert!(text.contains(&format!("<h2>{said}</h2>")), "{said}");
         }
-        // Five sheets of nine panels and their scales, three of subspaces, the map of bins and its scale.
-        assert_eq!(text.matches("<image").count(), 5 * 10 + 18 + 18 + 36 + 2);
+        for said in [
+            "expanded, U (k = 2)",
+            "BRDF values (1/sr) carry an expanded uncertainty",
+            "certificate PTB 4711",
+            "The largest contribution",
+            "What would make it better",
+            "a reference with a certificate",
+        ] {
+            assert!(text.contains(said), "{said}");
+        }
+        // Five sheets of nine panels and their scales, one without, three of subspaces, the map of bins and its scale.
+        assert_eq!(
+            text.matches("<image").count(),
+            5 * 10 + 9 + 18 + 18 + 36 + 2
+        );
         assert_eq!(text.matches("<img").count(), 6);
         assert!(text.contains("Two-thread fabric &lt;gold &amp; green&gt;"));
     }
@@ -559,6 +605,7 @@ mod tests {
         let input = ReportInput::new(&summary, &dense);
         let text = page(&input).into_string();
         assert!(!text.contains("Pointing") && !text.contains("Figures of merit"));
+        assert!(!text.contains("Uncertainty"));
         assert!(!text.contains("Measured against true"));
         assert!(text.contains("(relative)") && text.contains("values relative"));
         assert_eq!(text.matches("<img").count(), 2);
@@ -571,10 +618,11 @@ mod tests {
         let (dense, mask) = measured_fabric(4.0);
         let summary = full_summary(&dense, &mask, &truth);
         let rig = gonia_rig::Rig::paper(400);
+        let bars = error_bars(&dense, &rig);
         let input = ReportInput {
             truth: Some(&truth),
             measured: Some(&mask),
-            errors: Some(&dense),
+            errors: Some(&bars),
             rig: Some(&rig),
             ..ReportInput::new(&summary, &dense)
         };

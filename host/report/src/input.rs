@@ -1,5 +1,6 @@
 //! What a report is drawn from.
 
+use crate::uncertainty::ErrorBars;
 use gonia_brdf::{Brdf, DenseBrdf};
 use gonia_formats::Summary;
 use gonia_formats::baselines_toml::BaselineTable;
@@ -18,7 +19,7 @@ pub struct ReportInput<'a> {
     /// The cells that hold a measurement, where that is known.
     pub measured: Option<&'a CellMask>,
     /// The standard error of each cell, where it was computed.
-    pub errors: Option<&'a DenseBrdf>,
+    pub errors: Option<&'a ErrorBars>,
     /// The rig, for the spans of its frames.
     pub rig: Option<&'a Rig>,
     /// Models fitted to the measured BRDF.

@@ -29,6 +29,7 @@ mod shots;
 mod slices;
 mod spans;
 mod subspaces;
+mod uncertainty;
 
 pub use calibration::calibration;
 pub use figures::{write_figures, write_sphere};
@@ -36,3 +37,4 @@ pub use folder::{Drawn, report_folder};
 pub use html::write_report;
 pub use input::ReportInput;
 pub use make_baselines::make_baselines;
+pub use uncertainty::ErrorBars;

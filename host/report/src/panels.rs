@@ -84,6 +84,11 @@ pub fn measured(slices: &[Slice<bool>]) -> Markup {
     )
 }
 
+/// Kinds, each in a colour that is explained elsewhere.
+pub fn kinds<T>(slices: &[Slice<T>], paint: impl Fn(&T) -> [u8; 3]) -> Markup {
+    sheet(slices, paint, None)
+}
+
 struct Scale<'a> {
     /// Colour at 0 ..= 1 along the scale.
     ramp: &'a dyn Fn(f32) -> [u8; 3],
@@ -94,10 +99,20 @@ struct Scale<'a> {
 }
 
 /// Nine panels, θi from top to bottom, θv from left to right.
-fn sheet<T>(slices: &[Slice<T>], paint: impl Fn(&T) -> [u8; 3], scale: &Scale<'_>) -> Markup {
+fn sheet<'a, T>(
+    slices: &[Slice<T>],
+    paint: impl Fn(&T) -> [u8; 3],
+    scale: impl Into<Option<&'a Scale<'a>>>,
+) -> Markup {
     let width = LEFT + 3.0 * SIDE + 2.0 * GAP + 12.0;
     let rows_height = 3.0 * (SIDE + TOP);
-    let height = rows_height + BELOW + SCALE_HEIGHT + 26.0;
+    let scale = scale.into();
+    let of_scale = if scale.is_some() {
+        SCALE_HEIGHT + 26.0
+    } else {
+        0.0
+    };
+    let height = rows_height + BELOW + of_scale;
     let place = |k: usize| {
         let (row, column) = ((k / 3) as f64, (k % 3) as f64);
         (LEFT + column * (SIDE + GAP), TOP + row * (SIDE + TOP))
@@ -111,7 +126,7 @@ fn sheet<T>(slices: &[Slice<T>], paint: impl Fn(&T) -> [u8; 3], scale: &Scale<'_
         g transform=(format!("translate(13 {}) rotate(-90)", svg::n(0.5 * rows_height))) {
             (svg::text(0.0, 0.0, "middle", "axis", "azimuth of the light φi"))
         }
-        (colour_bar(scale, LEFT, rows_height + BELOW, 3.0 * SIDE + 2.0 * GAP))
+        @if let Some(scale) = scale { (colour_bar(scale, LEFT, rows_height + BELOW, 3.0 * SIDE + 2.0 * GAP)) }
     };
     svg::drawing(
         width,

@@ -18,8 +18,8 @@ pub struct Slice<T> {
     pub values: Vec<T>,
 }
 
-/// The nine pairs of polar angles, light by light.
-fn each<T>(grid: Grid, mut value: impl FnMut(usize, usize) -> T) -> Vec<Slice<T>> {
+/// The nine pairs of polar angles, light by light, of what `value` says of a light and a view.
+pub fn each<T>(grid: Grid, mut value: impl FnMut(usize, usize) -> T) -> Vec<Slice<T>> {
     let n = grid.n_phi();
     let node =
         |theta_deg: f64| ((theta_deg / grid.step_deg()).round() as usize).min(grid.n_theta() - 1);

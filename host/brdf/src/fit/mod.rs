@@ -122,7 +122,7 @@ pub fn fit<F: ModelFamily>(
     let problem = Problem::new(cells, &family, settings.loss)?;
     let (best, agreeing_starts) = search_from_many_starts(&problem, settings, progress)?;
     let values = family.canonical(problem.named.with(&problem.values(&best.at)));
-    let uncertainties = uncertainty::standard(&problem, &values);
+    let uncertainties = uncertainty::standard(&problem, &values, &[]);
     Ok(FittedModel {
         values,
         uncertainties,
@@ -195,6 +195,37 @@ impl<F: ModelFamily> FittedModel<F> {
     pub fn model(&self) -> Option<Box<dyn Brdf>> {
         self.family.model(&self.values)
     }
+}
+
+/// The standard uncertainties of a fit's numbers where all cells share errors too: each of `shared` gives for every
+/// cell of the fit, in the same order, and channel the share by which one standard uncertainty of an error changes the
+/// value. The errors are independent of each other. `None` of numbers that the data do not determine.
+///
+/// # Errors
+/// As [`fit`].
+pub fn uncertainties_with_shared<F: ModelFamily>(
+    fit: &FittedModel<F>,
+    cells: &[Cell],
+    loss: Loss,
+    shared: &[Vec<[f64; 3]>],
+) -> Result<Vec<Option<f64>>, FitError> {
+    let problem = Problem::new(cells, &fit.family, loss)?;
+    let (mut here, mut there) = (Vec::new(), Vec::new());
+    problem.residuals(&fit.values, &problem.cells, &mut here);
+    let shifts = shared.iter().map(|shares| {
+        let mut moved = cells.to_vec();
+        for (cell, shares) in moved.iter_mut().zip(shares) {
+            for (value, share) in cell.value.iter_mut().zip(shares) {
+                *value *= 1.0 + share;
+            }
+        }
+        let off = Problem::new(&moved, &fit.family, loss)?;
+        // Measured by the same mean: only the values are others.
+        problem.residuals(&fit.values, &off.cells, &mut there);
+        Ok(there.iter().zip(&here).map(|(a, b)| a - b).collect())
+    });
+    let shifts: Vec<Vec<f64>> = shifts.collect::<Result<_, FitError>>()?;
+    Ok(uncertainty::standard(&problem, &fit.values, &shifts))
 }
 
 /// Cells, and the model they are to be described by.

@@ -21,7 +21,13 @@ const RINGS: [(f64, usize); 4] = [(0.0, 1), (15.0, 6), (45.0, 10), (75.0, 12)];
 /// light and view exchangeable as in a reciprocal table): the covariance is A⁻¹ (Σ g gᵀ) A⁻¹ · G/(G−1)
 /// with the sum g of each of G groups (Liang and Zeger 1986). Where residuals are independent it is
 /// the usual s² A⁻¹.
-pub(super) fn standard(problem: &Problem<'_>, values: &[f64]) -> Vec<Option<f64>> {
+///
+/// An error that all cells share changes the residuals by one of `shifts`, and the numbers by A⁻¹ Jᵀ of that.
+pub(super) fn standard(
+    problem: &Problem<'_>,
+    values: &[f64],
+    shifts: &[Vec<f64>],
+) -> Vec<Option<f64>> {
     let n = values.len();
     let residuals =
         |values: &[f64], out: &mut Vec<f64>| problem.residuals(values, &problem.cells, out);
@@ -56,12 +62,18 @@ pub(super) fn standard(problem: &Problem<'_>, values: &[f64]) -> Vec<Option<f64>
     let gradients = group_gradients(problem, &jacobian, &here);
     let groups = gradients.len() as f64;
     let mut variances = vec![0.0; n];
-    for gradient in &gradients {
+    let mut add = |gradient: &DVector<f64>, weight: f64| {
         let scaled = DVector::from_fn(n, |k, _| gradient[k] / scale[k]);
         let influence = &inverse * scaled;
         for k in 0..n {
-            variances[k] += (influence[k] / scale[k]).powi(2) * groups / (groups - 1.0).max(1.0);
+            variances[k] += weight * (influence[k] / scale[k]).powi(2);
         }
+    };
+    for gradient in &gradients {
+        add(gradient, groups / (groups - 1.0).max(1.0));
+    }
+    for shift in shifts.iter().filter(|shift| shift.len() == here.len()) {
+        add(&jacobian.tr_mul(&DVector::from_column_slice(shift)), 1.0);
     }
     (0..n)
         .map(|k| {

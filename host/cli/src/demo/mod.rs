@@ -14,12 +14,17 @@ use gonia_acquire::camera::SimulatedFrames;
 use gonia_acquire::capture::travelling;
 use gonia_brdf::model::Material;
 use gonia_brdf::{DenseBrdf, Pose};
-use gonia_formats::dense::{write_dense, write_dense_channels};
+use gonia_formats::dense::{
+    ChannelErrors, CombineErrors, ERRORS_OF, write_dense, write_dense_channels, write_error_bars,
+};
 use gonia_formats::frames_csv::write_frames_csv;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::rig_toml::write_rig;
 use gonia_formats::samples::{write_noted_channels, write_noted_samples};
 use gonia_formats::{Summary, cell_mask, check_writable, checksum};
+use gonia_pipeline::budget::{
+    CellBudget, Holding, UNCERTAINTIES, budget_of, combine_errors, coverage,
+};
 use gonia_pipeline::process::{FrameSource, Masks, Processed};
 use gonia_pipeline::provenance::{Provenance, of_this_program};
 use gonia_pipeline::{
@@ -27,9 +32,9 @@ use gonia_pipeline::{
 };
 use gonia_plan::Rings;
 use gonia_render::Tabulated;
-use gonia_report::files::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
-use gonia_report::{ReportInput, write_report, write_sphere};
-use gonia_rig::{CellMask, DenseFile, Rig, Role, Scale};
+use gonia_report::files::{DENSE, ERRORS, MEASURED, REPORT, SUMMARY, TRUTH};
+use gonia_report::{ErrorBars, ReportInput, write_report, write_sphere};
+use gonia_rig::{Budget, CellMask, DenseFile, Rig, Role, Scale};
 use rig::DemoRig;
 use session::{Lab, Session};
 use std::path::PathBuf;
@@ -109,15 +114,13 @@ impl Demo {
         if let Some(bands) = run.demo.bands {
             rows.extend(run.measure_bands(bands, step, &measured)?);
         }
-        let (mut summary, dense, cells) = run.fill(step, &measured.session, measured.processed)?;
-        run.write_truth(&dense, &mut summary)?;
-        run.draw(&dense, &cells, &measured.rig, &mut summary)?;
-        summary::print(
-            &summary,
-            &measured.session,
-            &rows,
-            began.elapsed().as_secs_f64(),
-        );
+        let (session, rig) = (measured.session, measured.rig);
+        let mut filled = run.fill(step, &session, &rig, measured.processed)?;
+        rows.extend(filled.coverage.take());
+        run.write_truth(&filled.dense, &mut filled.summary)?;
+        run.draw(&mut filled, &rig)?;
+        let seconds = began.elapsed().as_secs_f64();
+        summary::print(&filled.summary, &session, &rows, seconds);
         Ok(())
     }
 }
@@ -130,6 +133,18 @@ struct Measured {
     /// What the calibration brought, for the table.
     rig_rows: Vec<(String, String)>,
     processed: Processed,
+}
+
+/// What became of the samples.
+struct FilledDemo {
+    summary: Summary,
+    dense: DenseFile,
+    /// The cells that hold a measurement.
+    measured: CellMask,
+    /// The standard errors, where they were computed …
+    bars: Option<ErrorBars>,
+    /// … and how often they are true, for the table.
+    coverage: Option<(String, String)>,
 }
 
 /// A demo under way.
@@ -239,31 +254,82 @@ impl Run {
         vec![("rig: direction error".to_owned(), text)]
     }
 
-    /// Interpolates the samples, and writes the dense BRDF and which cells were measured.
+    /// Interpolates the samples, and writes the dense BRDF, which cells were measured and, of the quick plan, the
+    /// standard errors: those of the whole plan are as large as both BRDFs together.
     fn fill(
         &self,
         step_deg: f64,
         session: &Session,
+        rig: &Rig,
         processed: Processed,
-    ) -> Result<(Summary, DenseFile, CellMask)> {
+    ) -> Result<FilledDemo> {
         let mut summary = summary::start(self.material.what, session, &processed, self.poses.len());
-        let options = FillOptions::with_step_deg(step_deg);
+        let options = FillOptions {
+            with_errors: self.demo.quick,
+            ..FillOptions::with_step_deg(step_deg)
+        };
         let scale = processed.scale();
-        let filled = fill(processed.samples, scale, &options, &self.progress.watch())?;
+        let budget = budget_of(rig, processed.calibration, &processed.samples);
+        let mut filled = fill(processed.samples, scale, &options, &self.progress.watch())?;
         let account = &filled.account;
         remarks::print(&account.remarks);
         let cells = filled.cells.iter().map(|cell| *cell as usize);
         let measured = CellMask::from_cells(filled.dense.grid, cells);
         cell_mask::write_mask(&self.path(MEASURED), &measured)?;
         summary::count_cells(&mut summary, account.counts.binned as u64, &measured);
+        let errors = filled.errors.take();
         let mut file = filled.into_rgb()?;
         file.provenance.extend(self.facts());
         summary.provenance = file.provenance.clone();
+        let (bars, coverage) = match errors {
+            Some(errors) => self.write_errors(&file, errors, &budget)?,
+            None => (None, None),
+        };
         let dense = self.progress.stage("writing the dense BRDF", |_| {
             write_dense(&self.path(DENSE), file)
         })?;
         summary.dense = Some(checksum::of_brdf(&dense.brdf));
-        Ok((summary, dense, measured))
+        Ok(FilledDemo {
+            summary,
+            dense,
+            measured,
+            bars,
+            coverage,
+        })
+    }
+
+    /// Writes the standard errors, combined with the rig's, and finds how often they are true.
+    fn write_errors(
+        &self,
+        dense: &DenseFile,
+        errors: ChannelErrors,
+        budget: &Budget,
+    ) -> Result<(Option<ErrorBars>, Option<(String, String)>)> {
+        const GREEN: usize = 1;
+        let (grid, planes) = (dense.brdf.grid(), dense.brdf.planes());
+        let truth = self.material.brdf.as_ref();
+        let noise = (&errors.standard_error[GREEN][..], Holding::Noise);
+        let coverage = CellBudget::new(grid, &planes[GREEN], noise, &errors.origin, budget)
+            .map(|cells| {
+                coverage(&cells, dense.scale, |light, view| {
+                    truth.eval(light.to_vec3(), view.to_vec3())[GREEN]
+                })
+            })
+            .map(|parts| {
+                let text = |(part, share): &(_, f64)| format!("{part} {:.1} %", 100.0 * share);
+                let parts: Vec<String> = parts.iter().map(text).collect();
+                ("true values within U (k = 2)".to_owned(), parts.join(", "))
+            });
+        let mut facts = dense.provenance.clone();
+        facts.insert(ERRORS_OF.to_owned(), checksum::of_brdf(&dense.brdf));
+        facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
+        let path = self.path(ERRORS);
+        let combine = combine_errors(grid, planes, budget);
+        let combine = combine.as_ref().map(|of| of as &CombineErrors<'_>);
+        self.progress.stage("writing the error bars", |_| {
+            write_error_bars(&path, grid, errors, combine, dense.scale, &facts)
+        })?;
+        Ok((Some(ErrorBars::read(&path)?), coverage))
     }
 
     /// The samples in bands, their dense BRDF, the true one, and how far these are apart.
@@ -319,13 +385,14 @@ impl Run {
     }
 
     /// Draws the report and writes the summary.
-    fn draw(
-        &self,
-        dense: &DenseFile,
-        measured: &CellMask,
-        rig: &Rig,
-        summary: &mut Summary,
-    ) -> Result<()> {
+    fn draw(&self, filled: &mut FilledDemo, rig: &Rig) -> Result<()> {
+        let FilledDemo {
+            summary,
+            dense,
+            measured,
+            bars,
+            ..
+        } = filled;
         let note = |summary: &mut Summary| {
             summary.stages = self.progress.stages();
             summary::list_files(summary, &self.demo.out);
@@ -339,6 +406,7 @@ impl Run {
                 &ReportInput {
                     truth: Some(self.material.brdf.as_ref()),
                     measured: Some(measured),
+                    errors: bars.as_ref(),
                     rig: Some(rig),
                     ..ReportInput::new(summary, &dense.brdf)
                 },

@@ -6,15 +6,16 @@ use crate::table;
 use gonia_brdf::Grid;
 use gonia_formats::{BinCounts, CellCounts, FileNote, PoseCounts, Summary};
 use gonia_pipeline::process::Processed;
-use gonia_report::files::{DENSE, MEASURED, REPORT, SUMMARY, TRUTH};
+use gonia_report::files::{DENSE, ERRORS, MEASURED, REPORT, SUMMARY, TRUTH};
 use gonia_rig::CellMask;
 use std::path::Path;
 
 /// What each file of a demo holds.
-const FILES: [(&str, &str); 12] = [
+const FILES: [(&str, &str); 13] = [
     (REPORT, "the report"),
     ("sphere.png", "the material on a sphere"),
     (DENSE, "the dense BRDF"),
+    (ERRORS, "its standard errors, and what they consist of"),
     (TRUTH, "the true BRDF on the same grid"),
     (
         "samples.npy",

@@ -3,7 +3,7 @@
 use crate::budget::equation::{Effects, Equation, Part, Shape, Slant};
 use gonia_brdf::{Direction, Elementary, Grid};
 use gonia_formats::dense::ErrorRow;
-use gonia_rig::{Budget, DenseChannels};
+use gonia_rig::Budget;
 
 /// How far apart directions are whose values give slopes, degrees, at least.
 const STEP_DEG: f64 = 2.0;
@@ -72,16 +72,17 @@ impl<'a> CellUncertainty<'a> {
     }
 }
 
-/// Combines the standard errors of a dense BRDF's noise and interpolation with its budget, a row of light at a time.
+/// Combines the standard errors of a dense BRDF's planes, of noise and interpolation with its budget, a row of light at a time.
 /// `None` where a plane is not of the grid's size.
 pub fn combine_errors<'a>(
-    dense: &'a DenseChannels,
+    grid: Grid,
+    planes: &'a [Vec<f32>],
     budget: &Budget,
 ) -> Option<impl Fn(usize, &[&[f32]]) -> ErrorRow + Sync + use<'a>> {
-    let side = dense.grid.n_directions();
-    let of_channel = |plane: &'a Vec<f32>| CellUncertainty::new(dense.grid, plane, budget);
+    let side = grid.n_directions();
+    let of_channel = |plane: &'a Vec<f32>| CellUncertainty::new(grid, plane, budget);
     let channels: Vec<CellUncertainty<'a>> =
-        dense.planes.iter().map(of_channel).collect::<Option<_>>()?;
+        planes.iter().map(of_channel).collect::<Option<_>>()?;
     let share = 1.0 / channels.len().max(1) as f64;
     Some(move |light: usize, noise: &[&[f32]]| {
         let mut row = ErrorRow {

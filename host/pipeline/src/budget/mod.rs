@@ -23,17 +23,25 @@
 //! arms' scatter, shot noise. Neglected: polarisation, fluorescence, and light that enters the material at one
 //! place and leaves it at another.
 
+mod albedo;
 mod cells;
+mod contribution;
 mod directions;
 mod equation;
+mod fits;
 mod record;
 mod summary;
 
+pub use albedo::{AlbedoUncertainty, albedo_uncertainty};
 pub use cells::{CellUncertainty, combine_errors};
 pub(crate) use cells::{PLACES, places, shape};
+pub use contribution::Contribution;
 pub use equation::{Effect, Effects, Equation, Part, Shape, Slant};
+pub(crate) use fits::shared_errors;
 pub use record::budget_in;
-pub use summary::{StratumBudget, summary};
+pub use summary::{
+    CellBudget, Holding, Shares, StratumBudget, coverage, not_stated, stated, summary,
+};
 
 use directions::direction_u;
 use gonia_brdf::{Pose, Sample};

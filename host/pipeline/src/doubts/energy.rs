@@ -150,7 +150,8 @@ impl Rings {
     }
 }
 
-fn ring_weights(n_theta: usize, n_phi: usize, step_deg: f64) -> Vec<f64> {
+/// ∫ sin θ cos θ dθ dφ of a node of each polar angle, the last one's on to the horizon.
+pub(crate) fn ring_weights(n_theta: usize, n_phi: usize, step_deg: f64) -> Vec<f64> {
     let step = step_deg.to_radians();
     (0..n_theta)
         .map(|ring| {

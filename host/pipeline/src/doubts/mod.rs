@@ -14,7 +14,7 @@ mod symmetry;
 mod values;
 
 pub use energy::DirectionalAlbedo;
-pub(crate) use energy::{AlbedoRows, remark as remark_on_energy};
+pub(crate) use energy::{AlbedoRows, remark as remark_on_energy, ring_weights};
 pub(crate) use layout::{Isotropy, remark as remark_on_layout};
 pub(crate) use symmetry::{
     remark_on_assumed as remark_on_assumed_isotropy, remarks as remarks_on_symmetry,

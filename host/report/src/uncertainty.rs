@@ -1,0 +1,282 @@
+//! The page that a reviewer asks for: what the values' uncertainty is made of, where, and what would make it smaller.
+
+use crate::panels;
+use crate::slices;
+use gonia_brdf::DenseBrdf;
+use gonia_formats::dense::{read_dense, read_origins};
+use gonia_formats::{FileError, Summary};
+use gonia_pipeline::budget::{
+    AlbedoUncertainty, CellBudget, Contribution, Holding, StratumBudget, albedo_uncertainty,
+    budget_in, not_stated, stated, summary,
+};
+use gonia_pipeline::provenance::Provenance;
+use gonia_rig::{Budget, Scale, Stratum};
+use maud::{Markup, html};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The standard errors of a dense BRDF, as their file holds them.
+#[derive(Clone, Debug)]
+pub struct ErrorBars {
+    /// A standard error a value, in its unit.
+    pub errors: DenseBrdf,
+    /// Where each cell's value is from ([`Origin`](gonia_brdf::interpolate::Origin)); empty where that is not said.
+    pub origins: Vec<u8>,
+    /// Where they came from; with their budget, if they hold one.
+    pub provenance: Provenance,
+}
+
+impl ErrorBars {
+    /// Reads what `gonia fill --error` wrote.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is none.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let file = read_dense(path)?;
+        Ok(Self {
+            errors: file.brdf,
+            origins: read_origins(path)?.unwrap_or_default(),
+            provenance: file.provenance,
+        })
+    }
+}
+
+/// The part of the page.
+pub fn section(bars: &ErrorBars, dense: &DenseBrdf, summary: &Summary) -> Markup {
+    let budget = budget_in(&bars.provenance).ok().flatten();
+    html! {
+        h2 { "Uncertainty" }
+        @match &budget {
+            Some(budget) => { (of_budget(bars, dense, summary.scale, budget)) }
+            None => p.soft {
+                "The error bars hold noise and interpolation alone: the samples say nothing of the rig that they came \
+                 from. Samples of gonia process carry its uncertainties."
+            }
+        }
+    }
+}
+
+/// The channel that the page is about: green.
+const CHANNEL: usize = 1;
+
+fn of_budget(bars: &ErrorBars, dense: &DenseBrdf, scale: Scale, budget: &Budget) -> Markup {
+    let errors = (&bars.errors.planes()[CHANNEL][..], Holding::All);
+    let plane = &dense.planes()[CHANNEL];
+    let Some(cells) = CellBudget::new(dense.grid(), plane, errors, &bars.origins, budget) else {
+        return html! {};
+    };
+    let parts = summary(&cells);
+    let albedos = [0.0, 30.0, 60.0].map(|theta| albedo_uncertainty(&cells, theta));
+    html! {
+        p.soft {
+            "Standard uncertainties (k = 1) of the green values as shares of them: medians over the cells of a part of \
+             the domain that are not extrapolated. Contributions are independent, and combine as the root of the sum of \
+             their squares."
+        }
+        (table(&parts, budget))
+        (sentence(&parts, &albedos, &bars.provenance, budget, scale))
+        div.sheets { (map(&cells)) }
+        (worth(&parts))
+    }
+}
+
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        p if p >= 9.95 => format!("{p:.0} %"),
+        p if p >= 0.995 => format!("{p:.1} %"),
+        p if p > 0.0 && p < 0.005 => "< 0.01 %".to_owned(),
+        p => format!("{p:.2} %"),
+    }
+}
+
+/// The budget: contributions by rows, parts of the domain by columns.
+fn table(parts: &[StratumBudget], budget: &Budget) -> Markup {
+    let whence = |part: Contribution| match part {
+        Contribution::Noise => "scatter of the samples (type A)",
+        Contribution::Patch => "the rig's geometry",
+        Contribution::Input(input) => budget.known_from(input).name(),
+    };
+    let counts = |part: &Contribution| parts.iter().any(|of| of.of(*part) > 0.0);
+    let all = Contribution::all().into_iter().filter(counts);
+    html! {
+        div.wide { table {
+            thead { tr {
+                th { "contribution" } th.num { "its own" } th { "known from" }
+                @for of in parts { th.num { (of.stratum.name()) } }
+            } }
+            tbody {
+                @for part in all { tr {
+                    td { (part.name()) }
+                    td.num { (stated(part, budget)) }
+                    td { (whence(part)) }
+                    @for of in parts { td.num { (percent(of.of(part))) } }
+                } }
+                tr {
+                    td { b { "combined, u" } } td {} td {}
+                    @for of in parts { td.num { b { (percent(of.combined)) } } }
+                }
+                tr {
+                    td { b { "expanded, U (k = 2)" } } td {} td {}
+                    @for of in parts { td.num { b { (percent(2.0 * of.combined)) } } }
+                }
+            }
+        } }
+    }
+}
+
+/// What a paper says of it, to be copied.
+fn sentence(
+    parts: &[StratumBudget],
+    albedos: &[AlbedoUncertainty],
+    provenance: &Provenance,
+    budget: &Budget,
+    scale: Scale,
+) -> Markup {
+    let of = |stratum| parts.iter().find(|of| of.stratum == stratum);
+    let values = match scale {
+        Scale::Absolute => "BRDF values (1/sr)",
+        Scale::Relative => "Relative BRDF values",
+    };
+    let largest = |of: &StratumBudget| {
+        let names = of.sorted().into_iter().take(2).map(|(part, _)| part.name());
+        names.collect::<Vec<_>>().join(" and ")
+    };
+    let of_part = |stratum, text: &str| {
+        of(stratum).map(|of| {
+            format!(
+                "{} {text} (mostly {})",
+                percent(2.0 * of.combined),
+                largest(of)
+            )
+        })
+    };
+    let said = [
+        of_part(Stratum::Interior, "at polar angles up to 75°"),
+        of_part(Stratum::Grazing, "at larger ones"),
+        of_part(
+            Stratum::Highlight,
+            "in the brightest per cent of the domain",
+        ),
+    ];
+    let said: Vec<String> = said.into_iter().flatten().collect();
+    let albedos: Vec<String> = albedos
+        .iter()
+        .map(|of| {
+            let (albedo, expanded) = (of.albedo, 2.0 * of.u);
+            format!("{albedo:.3} ± {expanded:.3} at {:.0}°", of.theta_i_deg)
+        })
+        .collect();
+    let certificate = provenance
+        .iter()
+        .find(|(name, _)| name.rsplit('.').next() == Some("certificate"));
+    let counts = |part: &&Contribution| parts.iter().any(|of| of.of(**part) > 0.0);
+    let unknown = not_stated(budget);
+    let unknown: Vec<&str> = unknown.iter().filter(counts).map(|of| of.name()).collect();
+    let inputs = match scale {
+        Scale::Absolute => "directions, apertures, the camera's response and the reference",
+        Scale::Relative => "directions, apertures and the camera's response",
+    };
+    html! {
+        h3 { "For a paper" }
+        blockquote {
+            (values) " carry an expanded uncertainty U = k·u with k = 2 (a coverage of about 95 %), u combined by the "
+            "measurement equation from noise, interpolation, " (inputs) ". The median U is " (said.join(", ")) ". The directional albedo in green is "
+            (albedos.join(", ")) " (U, k = 2)."
+            @if let Some((_, certificate)) = certificate { " Reference: certificate " (certificate) "." }
+        }
+        @if !unknown.is_empty() {
+            p.soft {
+                "Nobody stated " (unknown.join(", ")) ": cautious defaults stand for them, which a paper should say, or "
+                "better replace (keys of rig.toml)."
+            }
+        }
+    }
+}
+
+/// Colours of the map, the most frequent contribution first.
+const COLOURS: [[u8; 3]; 7] = [
+    [38, 112, 104],
+    [214, 160, 60],
+    [70, 110, 170],
+    [180, 72, 60],
+    [128, 96, 150],
+    [120, 140, 70],
+    [150, 150, 150],
+];
+
+/// Which contribution is the largest, cell by cell of the slices.
+fn map(cells: &CellBudget<'_>) -> Markup {
+    let all = Contribution::all();
+    let slices = slices::each(cells.grid(), |light, view| {
+        let shares = cells.shares(cells.grid().cell(light, view))?;
+        (0..all.len()).max_by(|a, b| shares[*a].total_cmp(&shares[*b]))
+    });
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for place in slices.iter().flat_map(|slice| &slice.values).flatten() {
+        *counts.entry(*place).or_default() += 1;
+    }
+    let mut order: Vec<(usize, usize)> = counts.into_iter().collect();
+    order.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    let total = order.iter().map(|(_, n)| n).sum::<usize>().max(1) as f64;
+    let colour = |place: usize| {
+        let rank = order.iter().position(|(of, _)| *of == place);
+        COLOURS[rank.map_or(COLOURS.len() - 1, |rank| rank.min(COLOURS.len() - 1))]
+    };
+    let paint = |place: &Option<usize>| place.map_or([255; 3], colour);
+    html! {
+        figure {
+            (panels::kinds(&slices, paint))
+            figcaption {
+                b { "The largest contribution" } " · "
+                @for (place, n) in &order {
+                    @let [r, g, b] = colour(*place);
+                    span style=(format!("color:rgb({r},{g},{b})")) { "■" }
+                    " " (all[*place].name()) " " (percent(*n as f64 / total)) " of these cells  "
+                }
+            }
+        }
+    }
+}
+
+/// What halving a contribution is worth.
+fn worth(parts: &[StratumBudget]) -> Markup {
+    let Some(of_all) = parts.iter().find(|of| of.stratum == Stratum::All) else {
+        return html! {};
+    };
+    let mut rows: Vec<(usize, Contribution)> =
+        Contribution::all().into_iter().enumerate().collect();
+    rows.sort_by(|a, b| of_all.halved[a.0].total_cmp(&of_all.halved[b.0]));
+    // What changes nothing that is shown is left out.
+    let counts = |place: &usize| {
+        let less = |of: &StratumBudget| of.halved[*place] < 0.99 * of.combined;
+        parts.iter().any(less)
+    };
+    rows.retain(|(place, _)| counts(place));
+    html! {
+        h3 { "What would make it better" }
+        p.soft {
+            "The median U (k = 2) of each part, now and with one contribution half as large. Four times the exposure \
+             halves noise; what more poses buy is in the chart of gonia chart SAMPLES, which leaves frames out and measures \
+             it."
+        }
+        div.wide { table {
+            thead { tr {
+                th { "halved" }
+                @for of in parts { th.num { (of.stratum.name()) } }
+                th { "by" }
+            } }
+            tbody {
+                tr {
+                    td { b { "as it is" } }
+                    @for of in parts { td.num { b { (percent(2.0 * of.combined)) } } }
+                    td {}
+                }
+                @for (place, part) in &rows { tr {
+                    td { (part.name()) }
+                    @for of in parts { td.num { (percent(2.0 * of.halved[*place])) } }
+                    td.soft { (part.remedy()) }
+                } }
+            }
+        } }
+    }
+}
