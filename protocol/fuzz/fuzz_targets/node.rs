@@ -5,7 +5,8 @@
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::steps::{End, Period, StepProgress};

@@ -2,7 +2,8 @@
 
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::settings::Axis;
