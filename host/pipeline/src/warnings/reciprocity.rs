@@ -1,4 +1,4 @@
-//! Doubts about a cosine: values that are not reciprocal, but would be without a factor.
+//! Warnings about a cosine: values that are not reciprocal, but would be without a factor.
 //!
 //! A BRDF has the same value with light and view exchanged. Of f·cosᵖθv·cosᵠθi the logarithms of two such
 //! values differ by (p − q)·(ln cos θv − ln cos θi): a line through the origin, whose slope is p − q. What
