@@ -1,6 +1,6 @@
 //! The neighbourhoods of the four lines: pixels along runs across each predicted line.
 
-use crate::profile::Growth;
+use crate::growth::Growth;
 use crate::{IdealLight, luminance};
 use gonia_brdf::Elementary;
 use gonia_rig::{CameraModel, Frame, Homography, Target};

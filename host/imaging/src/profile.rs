@@ -8,6 +8,7 @@
 //! of the target, over which a near light changes by some per cent: each of the three is the blur of
 //! something lit by 1 + g·τ + h·τ², with the light's growth g and its change h as the rig has it.
 
+use crate::growth::Growth;
 use crate::lines::{Edges, RunSample};
 use gonia_brdf::Elementary;
 
@@ -16,9 +17,6 @@ const WINDOW_SIGMAS: f64 = 3.0;
 
 /// How far it goes into the material, likewise.
 const MATERIAL_SIGMAS: f64 = 1.5;
-
-/// Pixels that differ by this share of the brightest are none that nothing falls on, however uneven the light is.
-const DIFFERS: f64 = 0.25;
 
 /// Edges of line and material about a station.
 #[derive(Clone, Copy)]
@@ -30,32 +28,6 @@ pub struct LineProfile {
     pub sigma: f64,
     /// How the light changes outwards.
     pub light: Growth,
-}
-
-/// Light across a line: 1 + `linear`·τ + `square`·τ² of that in the line's middle, τ pixels outwards.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Growth {
-    pub linear: f64,
-    pub square: f64,
-    /// A run of pixels is a piece of a row or a column, and goes along the line too where that is oblique: by so
-    /// much the light grows with each of its pixels outwards for that.
-    pub aside: f64,
-}
-
-impl Growth {
-    fn at(&self, tau: f64) -> f64 {
-        1.0 + tau * (self.linear + tau * self.square)
-    }
-
-    fn is_even(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// By how much the light differs over a run, at most [`DIFFERS`].
-    fn over(&self, [inner, outer]: [f64; 2]) -> f64 {
-        let at = |tau: f64| self.at(tau) * (1.0 + self.aside * tau);
-        (at(outer) - at(inner)).abs().min(DIFFERS)
-    }
 }
 
 /// The blur about τ of what is lit and lies on one side of an edge, with its derivatives.
