@@ -12,6 +12,7 @@
 //! | [`IdealLight`] | the irradiance of a point light over the target |
 //! | [`rectify`] | a frame as seen from straight above, for people |
 
+mod growth;
 pub mod hdr;
 mod highlight;
 mod hough;
