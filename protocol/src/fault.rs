@@ -72,9 +72,15 @@ impl FaultCode {
     pub const ENCODER_WARNING: Self = Self(23);
     /// An encoder says that its position is not valid.
     pub const ENCODER_INVALID: Self = Self(24);
+    /// Both waves of a quadrature ring changed at once: an edge was lost, and with it the position.
+    pub const EDGE_LOST: Self = Self(25);
+    /// The index of a quadrature ring came at another count than before, or did not come.
+    pub const INDEX_WRONG: Self = Self(26);
+    /// Homing did not find the index of a quadrature ring.
+    pub const INDEX_NOT_FOUND: Self = Self(27);
 
     /// Every fault and warning that exists, in the order of its number.
-    pub const PAGES: [FaultPage; 24] = [
+    pub const PAGES: [FaultPage; 27] = [
         page(
             Self::ENCODER_LOST,
             "encoder does not answer",
@@ -218,6 +224,24 @@ impl FaultCode {
             "encoder says that its position is not valid",
             "ring dirty, too far or too near, too fast or too hot",
             "clean the ring, check its distance, clear the fault, home",
+        ),
+        page(
+            Self::EDGE_LOST,
+            "encoder has lost an edge, and the position with it",
+            "interference on its cable, or the shaft was turned faster than max_speed",
+            "check the cable's screen and the receiver, clear the fault, home",
+        ),
+        page(
+            Self::INDEX_WRONG,
+            "encoder's index did not come at its count",
+            "its wire broken, encoder_counts_per_turn not what the ring has, counts lost to interference",
+            "check the index's wire, the cable's screen and encoder_counts_per_turn; clear the fault, home",
+        ),
+        page(
+            Self::INDEX_NOT_FOUND,
+            "encoder's index not found between home and soft_max",
+            "its wire broken, or a ring fitted so that the index lies beyond the travel",
+            "check the index's wire, or turn the ring on its shaft; clear the fault, home",
         ),
     ];
 

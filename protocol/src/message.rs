@@ -415,6 +415,10 @@ pub enum RequestRefusal {
     CauseRemains(FaultCode),
     /// There is no such pulse.
     NoSuchPulse,
+    /// A quadrature ring would give so many counts a second, where so many are followed.
+    CountRate(u32, u32),
+    /// The board has no pins for such an encoder or driver.
+    NoPins,
 }
 
 impl core::fmt::Display for RequestRefusal {
@@ -448,6 +452,14 @@ impl core::fmt::Display for RequestRefusal {
             RequestRefusal::Value => f.write_str("no such setting, or its value is out of range"),
             RequestRefusal::CauseRemains(code) => write!(f, "the cause is still there: {code}"),
             RequestRefusal::NoSuchPulse => f.write_str("no such pulse was captured"),
+            RequestRefusal::CountRate(counts_s, most) => write!(
+                f,
+                "max_speed times encoder_counts_per_turn would be {counts_s} counts/s, and a quadrature ring is \
+                 followed up to {most}; lower max_speed, or fit a ring of fewer lines"
+            ),
+            RequestRefusal::NoPins => f.write_str(
+                "the board has no pins for such an encoder or driver; see its wiring page, or use another board",
+            ),
         }
     }
 }

@@ -39,9 +39,9 @@ impl Axis {
 pub enum Key {
     /// Motor steps a turn of the shaft.
     StepsPerTurn = 0,
-    /// Encoder counts a turn of the shaft: a power of two.
+    /// Encoder counts a turn of the shaft: a power of two; of a quadrature ring, four times its lines.
     EncoderCountsPerTurn = 1,
-    /// Encoder count at 0°.
+    /// Encoder count at 0°; of a quadrature ring counted from its index.
     EncoderZero = 2,
     /// Lowest target, µdeg.
     SoftMin = 3,
@@ -118,7 +118,7 @@ pub enum Key {
     DriverAlarm = 34,
     /// How long a brake takes to engage or to let go, µs; 0 where none is fitted. Of the node.
     BrakeTime = 35,
-    /// What the encoder speaks: 0 for SSI, 1 for BiSS-C.
+    /// What the encoder speaks: 0 for SSI, 1 for BiSS-C, 2 for two square waves and an index (quadrature).
     EncoderKind = 36,
     /// How the motor's driver is set: 0 by hand (step and direction, potentiometer, jumpers), 1 a TMC2209 by its
     /// UART, 2 a TMC5160 by SPI. By wire, the next five are written to it at the start, read back, and watched.
@@ -342,7 +342,7 @@ pub const MEANINGS: [Meaning; N_SETTINGS] = [
     ),
     m(Key::DriverAlarm, "driver_alarm", "", (0, 2), [0; 2]),
     m(Key::BrakeTime, "brake_time", "µs", (0, 1_000_000), [0; 2]),
-    m(Key::EncoderKind, "encoder_kind", "", (0, 1), [0; 2]),
+    m(Key::EncoderKind, "encoder_kind", "", (0, 2), [0; 2]),
     m(Key::DriverKind, "driver_kind", "", (0, 2), [0; 2]),
     m(Key::DriverAddress, "driver_address", "", (0, 3), [0; 2]),
     m(Key::RunCurrent, "run_current", "mA", (50, 5_000), [800; 2]),

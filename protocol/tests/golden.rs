@@ -167,6 +167,14 @@ fn golden() -> Vec<(Message, &'static str)> {
             Message::Pulse(latch(303)),
             "1c01c4010201af02820201959aef3a8287a70efd9b9c39019ef4970100",
         ),
+        (
+            Message::Refused(RequestRefusal::CountRate(20_834, 20_000)),
+            "1101840102010be2a201a09c0119e8092900",
+        ),
+        (
+            Message::Refused(RequestRefusal::NoPins),
+            "0b01840102010c6dd336fa00",
+        ),
     ]
 }
 

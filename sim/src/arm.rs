@@ -2,7 +2,8 @@
 
 use gonia_firmware::driver::{DriverBus, tmc5160};
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::profile::TICKS_PER_US;
 use gonia_firmware::steps::{End, Period, REST_TICKS, StepChannel, StepProgress, StepTimer};
@@ -11,6 +12,7 @@ use gonia_protocol::settings::{Axis, Key};
 
 use crate::driver_chip::DriverChip;
 use crate::plant::{AxisPlant, PlantConfig};
+use crate::quadrature::QuadratureRing;
 
 /// Pins, encoders and memory of one simulated arm.
 #[derive(Debug)]
@@ -29,6 +31,9 @@ pub struct SimulatedArm {
     drivers_on: bool,
     brakes_released: bool,
     was_let_fall: bool,
+    /// Readers of quadrature rings, where the settings say that they are such.
+    rings: [QuadratureRing; 2],
+    has_quadrature_pins: bool,
     /// Until when each driver reports an alarm, µs.
     alarm_until_us: [u64; 2],
     /// Drivers that are set by wire; `None` where they are set by hand.
@@ -131,6 +136,8 @@ impl SimulatedArm {
             drivers_on: false,
             brakes_released: false,
             was_let_fall: false,
+            rings: Default::default(),
+            has_quadrature_pins: true,
             alarm_until_us: [0; 2],
             drivers: [None, None],
             answers: [None, None],
@@ -233,6 +240,16 @@ impl SimulatedArm {
         self.drivers[axis.index()].as_mut()
     }
 
+    /// The quadrature ring of an axis, for what goes wrong with it.
+    pub fn ring(&mut self, axis: Axis) -> &mut QuadratureRing {
+        &mut self.rings[axis.index()]
+    }
+
+    /// The board has no pins for quadrature rings.
+    pub fn take_quadrature_pins(&mut self) {
+        self.has_quadrature_pins = false;
+    }
+
     /// Whether the drivers were ever switched off, or not yet on, while the brakes were let go: nothing held
     /// the arm.
     pub fn was_let_fall(&self) -> bool {
@@ -262,6 +279,7 @@ impl SimulatedArm {
         self.drivers_on = false;
         self.brakes_released = false;
         self.answers = [None, None];
+        self.rings.iter_mut().for_each(QuadratureRing::restart);
         self.steps = [0; 2].map(|_| VirtualTimer::at_rest(self.now_us));
     }
 }
@@ -281,9 +299,21 @@ impl Hardware for SimulatedArm {
         self.steps[axis.index()].halt();
     }
 
-    fn encoder_word(&mut self, axis: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
-        let now_us = self.now_us;
-        self.axes[axis.index()].encoder_word(now_us)
+    fn has_encoder(&self, _: Axis, kind: EncoderKind) -> bool {
+        self.has_quadrature_pins || kind != EncoderKind::Quadrature
+    }
+
+    fn encoder_word(
+        &mut self,
+        axis: Axis,
+        setup: EncoderSetup,
+    ) -> Result<EncoderWord, EncoderLost> {
+        let (now_us, i) = (self.now_us, axis.index());
+        let plant = &mut self.axes[i];
+        match setup.kind {
+            EncoderKind::Ssi | EncoderKind::BissC => plant.encoder_word(now_us),
+            EncoderKind::Quadrature => self.rings[i].word(setup.turn, plant, now_us),
+        }
     }
 
     fn home_switch_closed(&mut self, axis: Axis) -> bool {

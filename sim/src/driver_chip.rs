@@ -16,6 +16,8 @@ pub enum DriverTrouble {
     None,
     /// No answer: no supply, or the wire is cut.
     Silent,
+    /// SPI: the data line from it is shorted to ground; it hears.
+    DataLow,
     /// A bit of every answer is bent on its way.
     Bent,
     /// Writes do not arrive; reads do.
@@ -128,6 +130,9 @@ impl DriverChip {
     pub fn spi_out(&self) -> [u8; tmc5160::DATAGRAM_LEN] {
         if self.trouble == DriverTrouble::Silent || self.bus != DriverBus::Spi {
             return [0xFF; tmc5160::DATAGRAM_LEN];
+        }
+        if self.trouble == DriverTrouble::DataLow {
+            return [0; tmc5160::DATAGRAM_LEN];
         }
         let [a, b, c, d] = self.value(self.asked).to_be_bytes();
         let bent = if self.trouble == DriverTrouble::Bent {

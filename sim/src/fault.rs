@@ -118,6 +118,18 @@ pub enum Fault {
         /// Of which axis.
         axis: Axis,
     },
+    /// The waves of the quadrature ring change so often without a sample.
+    EdgesLost {
+        /// Of which axis.
+        axis: Axis,
+        /// How often.
+        counts: u32,
+    },
+    /// The wire of the quadrature ring's index is cut.
+    IndexCut {
+        /// Of which axis.
+        axis: Axis,
+    },
     /// Readings of the encoder scatter, by so much (standard deviation).
     EncoderNoise {
         /// Of which axis.

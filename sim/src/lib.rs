@@ -16,6 +16,7 @@
 pub mod arm;
 pub mod driver_chip;
 pub mod plant;
+pub mod quadrature;
 pub mod swing;
 
 /// The steps of a run, as the controllers give them.

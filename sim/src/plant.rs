@@ -40,6 +40,8 @@ pub struct PlantConfig {
     pub ring_decay_s: f64,
     /// Encoder counts a turn.
     pub encoder_counts: u32,
+    /// The count at which the index of a quadrature ring is high.
+    pub encoder_index: u32,
     /// Standard deviation of a reading.
     pub encoder_noise_udeg: f64,
     /// Amplitude of the encoder's error, periodic in the turn: the ring's eccentricity.
@@ -105,6 +107,7 @@ impl PlantConfig {
             ring_hz: 10.0,
             ring_decay_s: 0.2,
             encoder_counts: 1 << 18,
+            encoder_index: 0,
             encoder_noise_udeg: 700.0,
             eccentricity_udeg: 4_000.0,
             eccentricity_phase_udeg: 0.0,
@@ -256,8 +259,8 @@ impl AxisPlant {
         match self.encoder_says {
             EncoderSays::Nothing => Ok(counts.into()),
             EncoderSays::Warning => Ok(EncoderWord {
-                counts,
                 warns: true,
+                ..counts.into()
             }),
             EncoderSays::Error => Err(EncoderLost::Invalid),
         }

@@ -267,6 +267,8 @@ impl World {
                     .axis(axis)
                     .let_encoder_say(EncoderSays::Warning);
             }
+            Fault::EdgesLost { axis, counts } => arm.hardware.ring(axis).lose_edges(counts),
+            Fault::IndexCut { axis } => arm.hardware.ring(axis).cut_index(),
             Fault::InterlockOpen { for_us } => self.interlock_open_until_us = now_us + for_us,
             Fault::Bumper { deg } => self.bumper_deg = deg,
             Fault::Unplugged { for_us } => {

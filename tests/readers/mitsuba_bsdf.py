@@ -5,39 +5,12 @@ usage: mitsuba_bsdf.py GONIA    (numpy, OpenEXR and mitsuba from PyPI; `cargo xt
 A BRDF that is neither mirrored nor turned into itself is tabulated by this script, exported by gonia and
 evaluated by Mitsuba. Ends with 1 where a limit is exceeded.
 """
-import subprocess
 import sys
 import tempfile
 
 import numpy as np
-import OpenEXR
 
-STEP = 4.0
-RINGS, AZIMUTHS = 22, 90
-
-
-def direction(theta, phi):
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
-
-
-def brdf(light, view):
-    """1/sr, green, for 3 x N directions: reciprocal, and asymmetric in every way."""
-    lobe = lambda v: 1 + 0.4 * v[0] + 0.3 * v[1] + 0.3 * v[0] * v[1]
-    half = light + view
-    half /= np.linalg.norm(half, axis=0)
-    return 0.1 * lobe(light) * lobe(view) + np.exp(-30 * (1 - half[2]))
-
-
-def table(path):
-    theta, phi = np.meshgrid(np.radians(STEP * np.arange(RINGS)), np.radians(STEP * np.arange(AZIMUTHS)), indexing="ij")
-    d = direction(theta.ravel(), phi.ravel())
-    n = d.shape[1]
-    light = np.repeat(d, n, axis=1)
-    view = np.tile(d, (1, n))
-    f = brdf(light, view).reshape(n, n).astype(np.float32)
-    header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with OpenEXR.File(header, {c: f for c in "RGB"}) as file:
-        file.write(path)
+from lopsided import brdf, direction, export, table
 
 
 def main():
@@ -49,8 +22,7 @@ def main():
 
     with tempfile.TemporaryDirectory() as folder:
         table(folder + "/dense.exr")
-        command = [gonia, "export", folder + "/dense.exr", "-o", folder + "/a.bsdf", "--assume-scale", "1"]
-        subprocess.run(command, check=True)
+        export(gonia, folder + "/dense.exr", folder + "/a.bsdf")
         bsdf = mi.load_dict({"type": "measured", "filename": folder + "/a.bsdf"})
     rng = np.random.default_rng(1)
     n = 20_000

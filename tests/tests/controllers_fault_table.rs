@@ -29,6 +29,9 @@ const PAGE: &str = "../docs/src/reference/faults.md";
 const STRIKE_US: u64 = 62_345_678;
 const N_POSES: usize = 30;
 const THETA: Axis = Axis::Theta;
+/// Counts of a quadrature ring, and the one at which its index is: 30°.
+const RING: u32 = 80_000;
+const RING_INDEX: u32 = RING / 12;
 /// Arms whose directions are nearer than this touch, on a rig that is built so.
 const KEEP_OUT_DEG: f64 = 25.0;
 
@@ -50,6 +53,8 @@ enum Cause {
     Alarm,
     /// The drivers of the light arm are set by wire, as the setting says, and one loses its supply for a moment.
     DriverReset,
+    /// At [`STRIKE_US`], on θ of the light arm, which has a quadrature ring with an index.
+    Quadrature(Fault),
     /// The power goes while the host saves settings.
     TornSave,
     /// The host falls silent during a move.
@@ -307,6 +312,36 @@ fn rows() -> Vec<Row> {
             "notes it in the journal as a warning",
         ),
         Row {
+            fault: "quadrature ring: an edge is lost in mid-move",
+            cause: Cause::Quadrature(Fault::EdgesLost {
+                axis: THETA,
+                counts: 1,
+            }),
+            does: "stops both axes at once; homing looks for the index anew",
+            codes: &[FaultCode::EDGE_LOST],
+            end: over_it(),
+            host: HOMES,
+        },
+        Row {
+            fault: "quadrature ring: four counts are lost, which no sample shows",
+            cause: Cause::Quadrature(Fault::EdgesLost {
+                axis: THETA,
+                counts: 3,
+            }),
+            does: "stops both axes when the index comes at another count; homing looks for it anew",
+            codes: &[FaultCode::INDEX_WRONG],
+            end: over_it(),
+            host: HOMES,
+        },
+        Row {
+            fault: "quadrature ring: the wire of its index is cut",
+            cause: Cause::Quadrature(Fault::IndexCut { axis: THETA }),
+            does: "stops both axes when the index is passed and does not come; homing does not find it, and ends at soft_max",
+            codes: &[FaultCode::INDEX_WRONG, FaultCode::INDEX_NOT_FOUND],
+            end: End::Stopped("encoder's index not found"),
+            host: "tries to home, stops the session",
+        },
+        Row {
             fault: "driver's alarm for 20 s, driver_alarm 1",
             cause: Cause::Alarm,
             does: "stops both axes, engages the brakes, switches the drivers off; `clear` is refused while the alarm is there",
@@ -480,6 +515,11 @@ fn light_arm(change: fn(&mut PlantConfig), of: Axis) -> SimulatedArm {
     SimulatedArm::new(axes, 21)
 }
 
+fn quadrature(theta: &mut PlantConfig) {
+    theta.encoder_counts = RING;
+    theta.encoder_index = RING_INDEX;
+}
+
 fn rig_for(cause: &Cause) -> (SimRig, u64) {
     let at = |at_us, fault| FaultPlan {
         events: vec![FaultEvent {
@@ -514,6 +554,10 @@ fn rig_for(cause: &Cause) -> (SimRig, u64) {
                 for_us: 20_000_000,
             };
             (SimRig::new(5, at(STRIKE_US, alarm)), STRIKE_US)
+        }
+        Cause::Quadrature(fault) => {
+            let arms = [light_arm(quadrature, THETA), SimulatedArm::default_arm(22)];
+            (SimRig::with_arms(5, at(STRIKE_US, *fault), arms), STRIKE_US)
         }
         Cause::DriverReset => {
             let reset = Fault::DriverReset { axis: THETA };
@@ -559,9 +603,11 @@ fn run(row: &Row) -> Seen {
     }
     let first = stops.iter().find(|stop| stop.time_us >= strike_us);
     let safe_s = match row.cause {
-        Cause::Event(_) | Cause::HostGone | Cause::Alarm | Cause::DriverReset => {
-            first.map(|stop| (stop.time_us - strike_us) as f64 * 1e-6)
-        }
+        Cause::Event(_)
+        | Cause::HostGone
+        | Cause::Alarm
+        | Cause::DriverReset
+        | Cause::Quadrature(_) => first.map(|stop| (stop.time_us - strike_us) as f64 * 1e-6),
         _ => None,
     };
     Seen { codes, end, safe_s }
@@ -571,7 +617,7 @@ fn run(row: &Row) -> Seen {
 fn adjust_light(rig: &SimRig, cause: &Cause) {
     if !matches!(
         cause,
-        Cause::Alarm | Cause::DriverReset | Cause::Adjusted(..)
+        Cause::Alarm | Cause::DriverReset | Cause::Quadrature(_) | Cause::Adjusted(..)
     ) {
         return;
     }
@@ -581,6 +627,16 @@ fn adjust_light(rig: &SimRig, cause: &Cause) {
         Cause::DriverReset => {
             for axis in Axis::BOTH {
                 light.set_setting(axis, Key::DriverKind, 1).unwrap();
+            }
+        }
+        Cause::Quadrature(_) => {
+            for (key, value) in [
+                (Key::EncoderKind, 2),
+                (Key::EncoderCountsPerTurn, RING as i32),
+                // 0°, counted from the index.
+                (Key::EncoderZero, (RING - RING_INDEX) as i32),
+            ] {
+                light.set_setting(THETA, key, value).unwrap();
             }
         }
         Cause::Adjusted(_, adjust) => {
@@ -650,6 +706,7 @@ fn session(rig: &SimRig, cause: &Cause) -> End {
                 "home switch says home above it too",
                 "home switch not found",
                 "home switch lets go below home",
+                "encoder's index not found",
                 "driver reports an alarm",
                 "camera not ready",
                 "interlock",

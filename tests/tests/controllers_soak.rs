@@ -10,7 +10,8 @@ use gonia_acquire::link::{RemoteController, Transport};
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::settings::ControllerSettings;
@@ -45,6 +46,9 @@ impl Hardware for Board {
         StepProgress::default()
     }
     fn halt(&mut self, _: Axis) {}
+    fn has_encoder(&self, _: Axis, _: EncoderKind) -> bool {
+        true
+    }
     fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         Ok(1000.into())
     }

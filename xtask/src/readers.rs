@@ -6,10 +6,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What the scripts in `tests/readers` import, at the versions that they were tried with.
-const PACKAGES: [&str; 3] = ["mitsuba==3.9.1", "numpy==2.4.6", "OpenEXR==3.5.3"];
+const PACKAGES: [&str; 7] = [
+    "mitsuba==3.9.1",
+    "netCDF4==1.7.5.1.post1",
+    "numpy==2.4.6",
+    "OpenEXR==3.5.3",
+    "pyradiance==1.3.1",
+    "xarray==2026.9.0",
+    "zarr==3.1.6",
+];
 
 /// Each reader's script, in `tests/readers`.
-const SCRIPTS: [&str; 1] = ["mitsuba_bsdf.py"];
+const SCRIPTS: [&str; 3] = ["mitsuba_bsdf.py", "radiance_xml.py", "arrays.py"];
 
 /// Has every reader read what gonia exports, and fails where one reads something else.
 pub fn check() -> Result<()> {

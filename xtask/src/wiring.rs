@@ -92,6 +92,15 @@ const ROLES: &[(&str, &str)] = &[
     ("φ encoder clock", "the same of φ's ring"),
     ("φ encoder data", "the same of φ's ring"),
     (
+        "θ ring A",
+        "line receiver of a quadrature ring's A, in place of clock and data (`encoder_kind` 2)",
+    ),
+    ("θ ring B", "the same of its B"),
+    ("θ ring index", "the same of its index (Z, reference mark)"),
+    ("φ ring A", "the same of φ's ring"),
+    ("φ ring B", "the same of φ's ring"),
+    ("φ ring index", "the same of φ's ring"),
+    (
         "θ home switch",
         "to ground; normally closed, it opens at home (`home_normally_closed`)",
     ),

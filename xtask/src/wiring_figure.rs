@@ -12,6 +12,11 @@ const BOXES: &[(&str, bool, &[&str])] = &[
         false,
         &["θ encoder clock", "θ encoder data"],
     ),
+    (
+        "or θ quadrature ring",
+        false,
+        &["θ ring A", "θ ring B", "θ ring index"],
+    ),
     ("θ home switch", false, &["θ home switch"]),
     ("enable of the drivers", false, &["drivers' current"]),
     (
@@ -29,6 +34,11 @@ const BOXES: &[(&str, bool, &[&str])] = &[
         "φ ring encoder (RS-422)",
         true,
         &["φ encoder clock", "φ encoder data"],
+    ),
+    (
+        "or φ quadrature ring",
+        true,
+        &["φ ring A", "φ ring B", "φ ring index"],
     ),
     ("φ home switch", true, &["φ home switch"]),
     ("brakes", true, &["brakes"]),

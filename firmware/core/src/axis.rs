@@ -5,7 +5,7 @@ use gonia_protocol::message::AxisStatus;
 use gonia_protocol::settings::{Axis, Key};
 
 use crate::error_map::{ErrorMap, GearMap};
-use crate::hardware::{EncoderLost, Hardware};
+use crate::hardware::{EncoderKind, EncoderLost, Hardware};
 use crate::profile::{Profile, Ramp, TICKS_PER_US};
 use crate::settings::ControllerSettings;
 use crate::steps::{DEPTH, End, Period};
@@ -62,8 +62,12 @@ struct Encoder {
     map: ErrorMap,
     /// It counts up when the axis turns down.
     is_reversed: bool,
-    /// The count at 0°.
+    /// The count at 0°; of a quadrature ring, counted from its index.
     zero: i64,
+    /// The count at the index, where angles are counted from it.
+    index: Option<u32>,
+    /// The count at which the index has come so far, if it has.
+    seen_index: Option<u32>,
     raw: Option<u32>,
     counts: i64,
     udeg: i32,
@@ -75,6 +79,15 @@ struct Encoder {
     warned_until_us: u64,
     /// A warning is to be given.
     has_warning: bool,
+}
+
+/// Where an axis met its home switch.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact {
+    /// The encoder's count, over turns.
+    count: i64,
+    /// And its angle, µdeg, as it was counted then.
+    pub udeg: i32,
 }
 
 /// A reading of the encoder.
@@ -278,20 +291,26 @@ impl AxisDrive {
         let encoder = &mut self.encoder;
         let word = hardware.encoder_word(self.axis, settings.encoder(self.axis));
         encoder.note_warning(now_us, word.is_ok_and(|word| word.warns));
-        let reading = match word.map(|word| word.counts) {
-            // Count 0 stays where it is.
-            Ok(raw) if encoder.is_reversed && raw > 0 && i64::from(raw) < turn => {
-                Ok(turn as u32 - raw)
-            }
-            reading => reading,
+        // Count 0 stays where it is.
+        let turned = |raw: u32| match encoder.is_reversed && raw > 0 && i64::from(raw) < turn {
+            true => turn as u32 - raw,
+            false => raw,
         };
-        let (counts, fault) = match reading {
+        if let Ok(word) = word {
+            encoder.seen_index = word.index.map(turned);
+        }
+        if encoder.index.is_some() && encoder.index != encoder.seen_index {
+            // It was lost while nobody asked.
+            return Err(FaultCode::INDEX_WRONG);
+        }
+        let (counts, fault) = match word.map(|word| turned(word.counts)) {
             Ok(raw) if i64::from(raw) < turn => {
                 let Some(last_raw) = encoder.raw else {
                     // The first reading: somewhere within half a turn of 0, until homing.
                     encoder.raw = Some(raw);
                     encoder.read_us = now_us;
-                    encoder.set_counts(wrap(i64::from(raw) - encoder.zero, turn), turn);
+                    encoder.index = encoder.seen_index;
+                    encoder.set_counts(wrap(i64::from(raw) - encoder.base(), turn), turn);
                     return Ok(EncoderReading::Fresh);
                 };
                 let moved = wrap(i64::from(raw) - i64::from(last_raw), turn);
@@ -306,6 +325,9 @@ impl AxisDrive {
                 }
             }
             Err(EncoderLost::Invalid) => (None, FaultCode::ENCODER_INVALID),
+            // One is enough, and none after it says so.
+            Err(EncoderLost::Edge) => return Err(FaultCode::EDGE_LOST),
+            Err(EncoderLost::Index) => return Err(FaultCode::INDEX_WRONG),
             _ => (None, FaultCode::ENCODER_LOST),
         };
         if let Some(counts) = counts {
@@ -341,24 +363,51 @@ impl AxisDrive {
     /// Forgets the encoder's past, so that the next reading is taken as it is.
     pub fn forget_encoder(&mut self) {
         self.encoder.raw = None;
+        self.encoder.index = None;
         self.encoder.bad_readings = 0;
     }
 
-    /// The axis stands at the home switch: chooses the encoder's turn that is nearest to the home
-    /// angle; an error where none is within the tolerance.
-    pub fn set_turn_at_home(&mut self, settings: &ControllerSettings) -> Result<(), FaultCode> {
+    /// Whether the encoder has an index from which angles are not counted yet.
+    pub fn has_new_index(&self) -> bool {
+        self.encoder.index.is_none() && self.encoder.seen_index.is_some()
+    }
+
+    /// Whether no angle is known before the encoder's index has come.
+    pub fn lacks_index(&self, settings: &ControllerSettings) -> bool {
+        settings.encoder(self.axis).kind == EncoderKind::Quadrature
+            && self.encoder.seen_index.is_none()
+    }
+
+    /// Where the axis stands.
+    pub fn contact(&self) -> Contact {
+        Contact {
+            count: self.encoder.counts + self.encoder.base(),
+            udeg: self.encoder.udeg,
+        }
+    }
+
+    /// The axis has met the home switch there, and is at rest: chooses the encoder's turn in which that was nearest to
+    /// the home angle; an error where none is within the tolerance. From here on angles are counted from the
+    /// encoder's index, where it has one.
+    pub fn set_turn(
+        &mut self,
+        contact: Contact,
+        settings: &ControllerSettings,
+    ) -> Result<(), FaultCode> {
+        let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
         let home = i64::from(settings.get(self.axis, Key::HomeAngle));
-        let off = (i64::from(self.encoder.udeg) - home + TURN_UDEG / 2).rem_euclid(TURN_UDEG)
-            - TURN_UDEG / 2;
+        let Contact { count: is, .. } = self.contact();
+        self.encoder.index = self.encoder.seen_index;
+        let base = self.encoder.base();
+        self.encoder.set_counts(contact.count - base, turn);
+        let was_udeg = i64::from(self.encoder.udeg);
+        let off = (was_udeg - home + TURN_UDEG / 2).rem_euclid(TURN_UDEG) - TURN_UDEG / 2;
+        let turns = (home + off - was_udeg + TURN_UDEG / 2).div_euclid(TURN_UDEG);
+        self.encoder.set_counts(is - base + turns * turn, turn);
+        self.rebase();
         if off.abs() > i64::from(settings.get(self.axis, Key::HomeTolerance)) {
             return Err(FaultCode::HOME_MISMATCH);
         }
-        let turn = i64::from(settings.get(self.axis, Key::EncoderCountsPerTurn));
-        let turns =
-            (home + off - i64::from(self.encoder.udeg) + TURN_UDEG / 2).div_euclid(TURN_UDEG);
-        let counts = self.encoder.counts + turns * turn;
-        self.encoder.set_counts(counts, turn);
-        self.rebase();
         Ok(())
     }
 
@@ -434,6 +483,11 @@ impl Encoder {
             self.has_warning |= now_us >= self.warned_until_us;
             self.warned_until_us = now_us + WARNING_GAP_US;
         }
+    }
+
+    /// The count from which `counts` are counted.
+    fn base(&self) -> i64 {
+        self.zero + i64::from(self.index.unwrap_or(0))
     }
 
     fn set_counts(&mut self, counts: i64, turn: i64) {

@@ -48,6 +48,7 @@ pub(crate) fn decode(word: u64, bits: u32, bytes: usize) -> Result<EncoderWord, 
     Ok(EncoderWord {
         counts: (checked >> 2) as u32,
         warns: checked & 1 == 0,
+        index: None,
     })
 }
 
@@ -145,8 +146,8 @@ mod tests {
     fn a_warning_is_told_and_leaves_the_position_as_it_is() {
         let word = encode(77, 18, true, true, (2, 1));
         let expected = EncoderWord {
-            counts: 77,
             warns: true,
+            ..77.into()
         };
         assert_eq!(read(word, 18), Ok(expected));
     }

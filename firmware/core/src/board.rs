@@ -97,7 +97,7 @@ mod tests {
     use crate::controller::ArmController;
     use crate::driver::DriverBus;
     use crate::hardware::{
-        DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, NotSaved,
+        DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, NotSaved,
     };
     use crate::node::identity;
     use crate::steps::{Period, StepProgress};
@@ -111,6 +111,9 @@ mod tests {
             StepProgress::default()
         }
         fn halt(&mut self, _: Axis) {}
+        fn has_encoder(&self, _: Axis, _: EncoderKind) -> bool {
+            true
+        }
         fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
             Ok(1000.into())
         }

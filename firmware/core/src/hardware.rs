@@ -12,6 +12,10 @@ pub enum EncoderLost {
     Silent,
     /// It answered that its position is not valid: its error bit.
     Invalid,
+    /// Quadrature: both waves changed between two samples.
+    Edge,
+    /// Quadrature: the index came at another count than before, or did not come.
+    Index,
 }
 
 /// What an encoder says.
@@ -21,6 +25,9 @@ pub struct EncoderWord {
     pub counts: u32,
     /// Its warning bit: it is near its limits (dirt, distance, temperature), and the position holds.
     pub warns: bool,
+    /// Of a quadrature ring, which knows no angle before its index has come: the count at which it came. `None`
+    /// before that, and for rings that are absolute.
+    pub index: Option<u32>,
 }
 
 impl From<u32> for EncoderWord {
@@ -29,6 +36,7 @@ impl From<u32> for EncoderWord {
         Self {
             counts,
             warns: false,
+            index: None,
         }
     }
 }
@@ -63,6 +71,8 @@ pub enum EncoderKind {
     Ssi,
     /// BiSS-C with its CRC: see [`crate::biss`].
     BissC,
+    /// Two square waves and an index: see [`crate::quadrature`].
+    Quadrature,
 }
 
 /// How an encoder is to be read.
@@ -70,7 +80,7 @@ pub enum EncoderKind {
 pub struct EncoderSetup {
     /// What it speaks.
     pub kind: EncoderKind,
-    /// Counts of one turn: a power of two.
+    /// Counts of one turn: a power of two, or of a quadrature ring a whole number of periods.
     pub turn: u32,
 }
 
@@ -90,7 +100,10 @@ pub trait Hardware {
     /// No step of this axis after this; whatever waits is dropped.
     fn halt(&mut self, axis: Axis);
 
-    /// The absolute encoder of the shaft.
+    /// Whether the board has pins for an encoder of this kind.
+    fn has_encoder(&self, axis: Axis, kind: EncoderKind) -> bool;
+
+    /// The encoder of the shaft. A quadrature ring says once that its position was lost.
     fn encoder_word(&mut self, axis: Axis, setup: EncoderSetup)
     -> Result<EncoderWord, EncoderLost>;
 

@@ -9,11 +9,14 @@
 //! `home_probe`, which is wider than the cam, and is home only where the switch still says so. Up would not do:
 //! the next cam may lie beyond the stop. Nor is it enough to search for a lower cam: the lowest one is known
 //! only by the stop below it.
+//!
+//! A quadrature ring has no angle until its index has come, so where the switch was met is kept as a count, and the
+//! axis drives up from there until the index comes. That it did so before, on the way down, is as good.
 
 use gonia_protocol::fault::FaultCode;
 use gonia_protocol::settings::Key;
 
-use crate::axis::AxisDrive;
+use crate::axis::{AxisDrive, Contact};
 use crate::hardware::Hardware;
 use crate::settings::ControllerSettings;
 
@@ -25,6 +28,8 @@ const CERTAIN: u8 = 50;
 const CLEARING_SLOWDOWN: u64 = 4;
 /// Settling timeouts until an arm has swung out.
 const SWING_OUT: u64 = 2;
+/// A turn, and what the search needs to come to rest.
+const INDEX_REACH_UDEG: i64 = 365_000_000;
 /// How many back-offs below the switch an axis may stand at the start.
 const MAX_BELOW: i64 = 10;
 
@@ -48,6 +53,10 @@ enum HomingPhase {
     Approach,
     /// Down, to see whether the switch still says home there.
     Probe,
+    /// Up, until the index of a quadrature ring has come.
+    FindIndex,
+    /// Slowing down above it.
+    StopAtIndex,
     /// Home is known; on to the lowest admissible angle.
     Park,
     /// Until the arm has swung out.
@@ -67,6 +76,8 @@ pub struct Homing {
     phase: HomingPhase,
     same_readings: u8,
     last_reading: bool,
+    /// Where the slow approach met the switch.
+    contact: Option<Contact>,
     /// Of the encoder at rest.
     rest_sum: i64,
     rest_count: i64,
@@ -79,6 +90,7 @@ impl Homing {
             phase: HomingPhase::Look,
             same_readings: 1,
             last_reading: at_home,
+            contact: None,
             rest_sum: 0,
             rest_count: 0,
         }
@@ -106,6 +118,7 @@ impl Homing {
         self.note(at_home);
         match self.phase {
             HomingPhase::Probe => self.probe(at_home, drive, settings),
+            HomingPhase::FindIndex | HomingPhase::StopAtIndex => self.find_index(drive, settings),
             HomingPhase::Park | HomingPhase::Rest { .. } | HomingPhase::Read { .. } => {
                 self.park(now_us, drive, settings);
                 Ok(())
@@ -173,7 +186,11 @@ impl Homing {
             // The first contact counts, bounce or not: the encoder has the angle.
             HomingPhase::Approach if at_home => {
                 drive.halt(hardware);
-                drive.set_turn_at_home(settings)?;
+                let contact = drive.contact();
+                self.contact = Some(contact);
+                if !drive.lacks_index(settings) {
+                    drive.set_turn(contact, settings)?;
+                }
                 if drive.travels_a_turn(settings) {
                     let way = i64::from(settings.get(drive.axis(), Key::HomeProbe));
                     let ramp = drive.ramp(settings, Key::HomeFastSpeed);
@@ -181,7 +198,7 @@ impl Homing {
                     self.same_readings = 0;
                     self.phase = HomingPhase::Probe;
                 } else {
-                    self.go_to_park(drive, settings);
+                    self.go_to_index(drive, settings)?;
                 }
             }
             HomingPhase::Approach if !drive.is_moving() => return Err(FaultCode::HOME_NOT_FOUND),
@@ -201,8 +218,62 @@ impl Homing {
             return Err(FaultCode::HOME_AMBIGUOUS);
         }
         if !drive.is_moving() && at_home && self.same_readings >= CERTAIN {
-            self.go_to_park(drive, settings);
+            return self.go_to_index(drive, settings);
         }
+        Ok(())
+    }
+
+    /// The turn is known. An encoder that knows its angle goes on to park; one that lacks its index goes up for it, a
+    /// turn and a little more at most, and no further than the highest admissible angle.
+    fn go_to_index(
+        &mut self,
+        drive: &mut AxisDrive,
+        settings: &ControllerSettings,
+    ) -> Result<(), FaultCode> {
+        if !drive.lacks_index(settings) {
+            return self.count_from_index(drive, settings);
+        }
+        let get = |key| i64::from(settings.get(drive.axis(), key));
+        let reach = (get(Key::SoftMax) - get(Key::HomeAngle)).min(INDEX_REACH_UDEG);
+        let contact = self.contact.map_or(0, |contact| i64::from(contact.udeg));
+        let way = contact + reach - i64::from(drive.encoder_udeg());
+        drive.run(
+            drive.steps_of(way),
+            drive.ramp(settings, Key::HomeFastSpeed),
+        );
+        self.phase = HomingPhase::FindIndex;
+        Ok(())
+    }
+
+    fn find_index(
+        &mut self,
+        drive: &mut AxisDrive,
+        settings: &ControllerSettings,
+    ) -> Result<(), FaultCode> {
+        match self.phase {
+            HomingPhase::FindIndex if !drive.lacks_index(settings) => {
+                drive.decelerate();
+                self.phase = HomingPhase::StopAtIndex;
+            }
+            HomingPhase::FindIndex if !drive.is_moving() => return Err(FaultCode::INDEX_NOT_FOUND),
+            HomingPhase::StopAtIndex if !drive.is_moving() => {
+                return self.count_from_index(drive, settings);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// At rest, with the index known: where the switch was met is an angle now.
+    fn count_from_index(
+        &mut self,
+        drive: &mut AxisDrive,
+        settings: &ControllerSettings,
+    ) -> Result<(), FaultCode> {
+        if let (Some(contact), true) = (self.contact, drive.has_new_index()) {
+            drive.set_turn(contact, settings)?;
+        }
+        self.go_to_park(drive, settings);
         Ok(())
     }
 

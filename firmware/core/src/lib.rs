@@ -32,6 +32,7 @@ pub mod homing;
 pub mod node;
 pub mod power;
 pub mod profile;
+pub mod quadrature;
 pub mod settings;
 pub mod settling;
 pub mod single_wire;

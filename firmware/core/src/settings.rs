@@ -9,6 +9,7 @@ use gonia_protocol::settings::{Axis, Key, MEANINGS, N_SETTINGS};
 
 use crate::driver::{DriverBus, DriverSetup, currents};
 use crate::hardware::{EncoderKind, EncoderSetup};
+use crate::quadrature::MOST_COUNTS_S;
 
 const FORMAT: u8 = 1;
 const HEAD: usize = 2;
@@ -25,9 +26,14 @@ pub struct ControllerSettings {
 /// Steps a second that the step timers' interrupts and the queue in front of them keep up with, on both axes.
 pub const MOST_STEPS_S: u64 = 50_000;
 
-/// A value out of range, or one that contradicts another or what the board can do.
+/// Why settings cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BadValue;
+pub enum BadValue {
+    /// A value out of range, or one that contradicts another or what the step timers can do.
+    Value,
+    /// A quadrature ring would give so many counts a second: more than [`MOST_COUNTS_S`].
+    CountRate(u32),
+}
 
 /// Stored bytes that are no settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,9 +63,24 @@ impl ControllerSettings {
         EncoderSetup {
             kind: match self.get(axis, Key::EncoderKind) {
                 0 => EncoderKind::Ssi,
-                _ => EncoderKind::BissC,
+                1 => EncoderKind::BissC,
+                _ => EncoderKind::Quadrature,
             },
             turn: self.get_u64(axis, Key::EncoderCountsPerTurn) as u32,
+        }
+    }
+
+    /// Counts a second of a quadrature ring at the highest speed; 0 of another kind, whose counts nobody has to keep up
+    /// with.
+    fn counts_s(&self, axis: Axis) -> u32 {
+        let EncoderSetup { kind, turn } = self.encoder(axis);
+        match kind {
+            EncoderKind::Ssi | EncoderKind::BissC => 0,
+            EncoderKind::Quadrature => {
+                let counts_s =
+                    (u64::from(turn) * self.get_u64(axis, Key::MaxSpeed)).div_ceil(360_000_000);
+                u32::try_from(counts_s).unwrap_or(u32::MAX)
+            }
         }
     }
 
@@ -144,9 +165,7 @@ impl ControllerSettings {
             let steps_s = self.get_u64(axis, Key::StepsPerTurn) * self.get_u64(axis, Key::MaxSpeed)
                 / 360_000_000;
             let consistent = steps_s <= MOST_STEPS_S
-                && self
-                    .get_u64(axis, Key::EncoderCountsPerTurn)
-                    .is_power_of_two()
+                && is_turn_of(self.encoder(axis))
                 && get(Key::SoftMin) < get(Key::SoftMax)
                 && get(Key::HomeAngle) <= get(Key::SoftMin)
                 && get(Key::EncoderZero) < get(Key::EncoderCountsPerTurn)
@@ -160,10 +179,23 @@ impl ControllerSettings {
                     .driver(axis)
                     .is_none_or(|driver| currents(&driver).is_some());
             if !in_range || !consistent {
-                return Err(BadValue);
+                return Err(BadValue::Value);
+            }
+            let counts_s = self.counts_s(axis);
+            if counts_s > MOST_COUNTS_S {
+                return Err(BadValue::CountRate(counts_s));
             }
         }
         Ok(())
+    }
+}
+
+/// Whether an encoder of this kind can have so many counts a turn.
+fn is_turn_of(encoder: EncoderSetup) -> bool {
+    match encoder.kind {
+        EncoderKind::Ssi | EncoderKind::BissC => encoder.turn.is_power_of_two(),
+        // Four counts are a period of the waves.
+        EncoderKind::Quadrature => encoder.turn.is_multiple_of(4),
     }
 }
 
@@ -232,14 +264,14 @@ mod tests {
             (Key::EncoderCountsPerTurn, (1 << 18) + 1),
             (Key::MotorReversed, 2),
         ] {
-            assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue));
+            assert_eq!(settings.set(Axis::Theta, key, value), Err(BadValue::Value));
         }
         assert_eq!(settings, ControllerSettings::default());
         // What a potentiometer sets may be anything; by wire, 2 A are more than 110 mΩ give.
         let set =
             |settings: &mut ControllerSettings, key, value| settings.set(Axis::Theta, key, value);
         set(&mut settings, Key::RunCurrent, 2_000).unwrap();
-        assert_eq!(set(&mut settings, Key::DriverKind, 1), Err(BadValue));
+        assert_eq!(set(&mut settings, Key::DriverKind, 1), Err(BadValue::Value));
         set(&mut settings, Key::SenseResistor, 75).unwrap();
         set(&mut settings, Key::DriverKind, 1).unwrap();
         for (key, value) in [
@@ -247,10 +279,38 @@ mod tests {
             (Key::HoldCurrent, 2_001),
             (Key::SenseResistor, 110),
         ] {
-            assert_eq!(set(&mut settings, key, value), Err(BadValue));
+            assert_eq!(set(&mut settings, key, value), Err(BadValue::Value));
         }
         settings
             .set(Axis::Theta, Key::StepsPerTurn, 1_200_000)
             .unwrap();
+    }
+
+    #[test]
+    fn a_quadrature_ring_has_whole_periods_and_no_more_counts_a_second_than_are_followed() {
+        let mut settings = ControllerSettings::default();
+        let set =
+            |settings: &mut ControllerSettings, key, value| settings.set(Axis::Phi, key, value);
+        let turn = Key::EncoderCountsPerTurn;
+        // 10,000 lines: no ring that is read by words has them.
+        assert_eq!(set(&mut settings, turn, 40_000), Err(BadValue::Value));
+        set(&mut settings, Key::EncoderKind, 2).unwrap();
+        assert_eq!(set(&mut settings, turn, 40_002), Err(BadValue::Value));
+        // 15°/s of 480,000 counts are the most.
+        let too_fast = Err(BadValue::CountRate(20_001));
+        assert_eq!(set(&mut settings, turn, 480_004), too_fast);
+        set(&mut settings, turn, 480_000).unwrap();
+        let too_fast = Err(BadValue::CountRate(20_002));
+        assert_eq!(set(&mut settings, Key::MaxSpeed, 15_001_000), too_fast);
+        set(&mut settings, turn, 40_000).unwrap();
+        set(&mut settings, Key::MaxSpeed, 25_000_000).unwrap();
+        assert_eq!(
+            set(&mut settings, Key::EncoderKind, 1),
+            Err(BadValue::Value)
+        );
+        // Back to SSI there is no such limit.
+        set(&mut settings, turn, 1 << 18).unwrap();
+        set(&mut settings, Key::EncoderKind, 0).unwrap();
+        set(&mut settings, turn, 1 << 26).unwrap();
     }
 }

@@ -11,6 +11,9 @@ const MOST_BITS: u32 = 26;
 /// The encoder needs this long after a word before it latches anew, µs.
 const PAUSE_US: u64 = 50;
 
+/// A word, its bits of position, and its bytes.
+type Decode = fn(u64, u32, usize) -> Result<EncoderWord, EncoderLost>;
+
 /// One encoder on its SPI.
 #[derive(Debug)]
 pub struct SpiEncoder<S> {
@@ -41,20 +44,17 @@ impl<S: SpiBus> SpiEncoder<S> {
 
     fn read(&mut self, setup: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         let bits = setup.turn.max(2).ilog2().min(MOST_BITS);
-        let used = match setup.kind {
-            EncoderKind::Ssi => ssi::bytes(bits),
-            EncoderKind::BissC => biss::bytes(bits),
+        let (used, decode): (usize, Decode) = match setup.kind {
+            EncoderKind::Ssi => (ssi::bytes(bits), ssi::decode),
+            EncoderKind::BissC => (biss::bytes(bits), biss::decode),
+            EncoderKind::Quadrature => return Err(EncoderLost::Silent),
         };
         let mut word = [0u8; 8];
         let read = self
             .spi
             .read(word.get_mut(..used).ok_or(EncoderLost::Silent)?);
         read.map_err(|_| EncoderLost::Silent)?;
-        let word = u64::from_be_bytes(word);
-        match setup.kind {
-            EncoderKind::Ssi => ssi::decode(word, bits, used),
-            EncoderKind::BissC => biss::decode(word, bits, used),
-        }
+        decode(u64::from_be_bytes(word), bits, used)
     }
 }
 
@@ -140,8 +140,8 @@ mod tests {
     fn a_warning_is_told_and_leaves_the_position_as_it_is() {
         let words = [ssi_word(77, 18) & !(1 << 43)];
         let expected = EncoderWord {
-            counts: 77,
             warns: true,
+            ..77.into()
         };
         let word = encoder(&words).word(0, ring(EncoderKind::Ssi, 18));
         assert_eq!(word, Ok(expected));

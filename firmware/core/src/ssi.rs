@@ -31,5 +31,6 @@ pub(crate) fn decode(word: u64, bits: u32, bytes: usize) -> Result<EncoderWord, 
     Ok(EncoderWord {
         counts: (word << 1 >> (64 - bits)) as u32,
         warns: quiet == 0,
+        index: None,
     })
 }

@@ -7,6 +7,7 @@ use gonia_pins::{
     Board, CLOCK_TIMER, FLASH, FLASH_LEN, LIFE_TIMER, Level as Wanted, Pin as PinOf, SECTORS,
     STEP_TIMERS, StepEdge, TimerOutput,
 };
+use gonia_sim::quadrature::Levels;
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::mcu::Operate;
@@ -19,8 +20,8 @@ use rigless::time::VirtualNanos;
 
 use crate::chips::{Shared, lock};
 use crate::nvic;
-use crate::one_wire::OneWire;
 use crate::part::Bench;
+use crate::world::Axis;
 
 /// What the script asks of the chip's side while the clock stands.
 #[derive(Debug)]
@@ -183,6 +184,7 @@ struct State {
     gate: Option<Level>,
     time_pulses: u64,
     inputs: [Option<Level>; 5],
+    waves: [Option<Levels>; 2],
     resets: usize,
     is_erasing: bool,
     core_is_held: bool,
@@ -264,7 +266,9 @@ impl Wiring {
         let switches = [0, 1].map(|i| world.axes[i].plant.switch_closed(now_us));
         let alarms = [0, 1].map(|i| world.axes[i].alarm_closed);
         let closed = world.chain_is_closed();
+        let waves = [0, 1].map(|i| world.axes[i].levels(at.0));
         drop(world);
+        self.show_waves(chip, at, waves);
         let [theta, phi] = self.board.axes;
         let mut inputs = vec![
             (theta.home_switch.pin, switches[0]),
@@ -279,6 +283,22 @@ impl Wiring {
             if *known != Some(Level::from(!closed)) {
                 *known = Some(Level::from(!closed));
                 drive(chip, at, pin, drives);
+            }
+        }
+    }
+
+    /// The line receivers of quadrature rings.
+    fn show_waves(&mut self, chip: &mut Stm32f427, at: VirtualNanos, waves: [Option<Levels>; 2]) {
+        for (i, axis) in self.board.axes.iter().enumerate() {
+            let (Some(wires), Some(levels)) = (axis.quadrature, waves[i]) else {
+                continue;
+            };
+            if self.state.waves[i].replace(levels) == Some(levels) {
+                continue;
+            }
+            let pins = [wires.first.pin, wires.second.pin, wires.index.pin];
+            for (pin, level) in pins.into_iter().zip(levels) {
+                drive(chip, at, pin, Some(Level::from(level)));
             }
         }
     }
@@ -388,8 +408,8 @@ impl Driver<Bench> for Wiring {
     ) -> Option<VirtualNanos> {
         let due = |world: &Shared| {
             let world = lock(world);
-            let wires = world.axes.iter().filter_map(|axis| axis.driver.as_ref());
-            wires.filter_map(OneWire::due_ns).min().unwrap_or(u64::MAX)
+            let due = world.axes.iter().filter_map(Axis::due_ns);
+            due.min().unwrap_or(u64::MAX)
         };
         if stop.at.0 < self.until_ns {
             let next_ns = self.until_ns.min(due(&self.world));

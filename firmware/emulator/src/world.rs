@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use gonia_firmware::driver::tmc5160::DATAGRAM_LEN;
 use gonia_sim::plant::{AxisPlant, PlantConfig};
+use gonia_sim::quadrature::{Levels, levels};
 
 use crate::one_wire::OneWire;
 
@@ -74,6 +75,8 @@ pub struct Axis {
     pub ring: RingKind,
     /// The encoder's shift register.
     pub ssi: Ssi,
+    /// Waves and index of a quadrature ring.
+    pub waves: Waves,
     /// The driver that is set by wire; `None` for one that is set by hand.
     pub driver: Option<OneWire>,
     /// The driver's select line is low, and what it has heard since.
@@ -96,6 +99,8 @@ pub enum RingKind {
         /// Which bit flips, counted from the first one.
         flips: Option<u32>,
     },
+    /// Two waves and an index.
+    Quadrature,
 }
 
 /// A ring's shift register: latches at the first clock after its pause.
@@ -107,6 +112,24 @@ pub struct Ssi {
     /// Words begun.
     pub words: u64,
 }
+
+/// What a quadrature ring shows. Between two steps of the motor it turns by several counts, one after the other as fast as
+/// its data sheet lets it be at the highest count rate that the settings allow.
+#[derive(Debug, Default)]
+pub struct Waves {
+    /// The count that is shown; `None` until the first look.
+    at: Option<u32>,
+    /// The next count is due then, ns.
+    due_ns: Option<u64>,
+    last_ns: u64,
+    /// The index's wire is cut.
+    pub index_is_cut: bool,
+    /// The next count comes with the one after it, at one moment.
+    pub skips_one: bool,
+}
+
+/// The shortest state of the waves, ns: half of a count at 20,000 counts/s.
+const STATE_NS: u64 = 25_000;
 
 /// Counts of the ring.
 const COUNTS: u32 = 1 << 18;
@@ -132,6 +155,7 @@ impl Axis {
             ssi_hz: 0.0,
             ring: RingKind::Ssi,
             ssi: Ssi::default(),
+            waves: Waves::default(),
             driver: None,
             heard: None,
             answer: [0; DATAGRAM_LEN],
@@ -182,6 +206,37 @@ impl Axis {
         self.narrowest_ns = self.narrowest_ns.min(now_ns - self.last_ns);
     }
 
+    /// Levels of a quadrature ring.
+    pub fn levels(&mut self, now_ns: u64) -> Option<Levels> {
+        if self.ring != RingKind::Quadrature {
+            return None;
+        }
+        let stands = self.plant.encoder_counts(now_ns / 1000)?;
+        let (config, waves) = (self.plant.config(), &mut self.waves);
+        let turn = config.encoder_counts;
+        let mut at = waves.at.unwrap_or(stands);
+        if at != stands && now_ns >= waves.last_ns + STATE_NS {
+            let is_up = (stands + turn - at) % turn <= turn / 2;
+            let by = if core::mem::take(&mut waves.skips_one) {
+                2
+            } else {
+                1
+            };
+            at = (at + if is_up { by } else { turn - by }) % turn;
+            waves.last_ns = now_ns;
+        }
+        waves.at = Some(at);
+        waves.due_ns = (at != stands).then(|| now_ns.max(waves.last_ns + STATE_NS));
+        let [first, second, index] = levels(config, at);
+        Some([first, second, index && !waves.index_is_cut])
+    }
+
+    /// When its wires or its ring do something by themselves next, ns.
+    pub fn due_ns(&self) -> Option<u64> {
+        let wire = self.driver.as_ref().and_then(OneWire::due_ns);
+        wire.into_iter().chain(self.waves.due_ns).min()
+    }
+
     /// Eight clocks of the SPI, ending now: what the data line brought.
     pub fn shift(&mut self, now_ns: u64) -> u32 {
         let byte_ns = (8e9 / self.ssi_hz.max(1.0)) as u64;
@@ -202,6 +257,8 @@ impl Axis {
                     let word = counts.map_or(u64::MAX, |counts| biss_word(counts, acknowledgement));
                     word ^ flips.map_or(0, |bit| 1 << (63 - bit))
                 }
+                // Nothing on that line.
+                RingKind::Quadrature => u64::MAX,
             };
             self.ssi.shifted = 0;
             self.ssi.words += 1;

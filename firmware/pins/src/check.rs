@@ -35,6 +35,8 @@ pub enum Fault {
     Complement(&'static str),
     /// The host's wire is on two ports.
     HostPorts,
+    /// The waves and the index of a quadrature ring are on more than one port.
+    QuadraturePorts,
     /// SPIs 1 to 4 read encoders, each one.
     SharedSpi(u8),
     /// The drivers' SPI is an encoder's.
@@ -85,6 +87,10 @@ impl fmt::Display for Fault {
             Self::HostPorts => write!(
                 f,
                 "the host's wires are on two ports; write PA2 with PA3, or PD5 with PD6"
+            ),
+            Self::QuadraturePorts => write!(
+                f,
+                "A, B and index of a ring are on two ports; put all three on one"
             ),
             Self::SharedSpi(spi) => {
                 write!(
@@ -166,6 +172,12 @@ fn check_pins(board: &Board, report: &mut impl FnMut(Fault)) {
     }
     if board.host_tx.pin.port != board.host_rx.pin.port {
         report(Fault::HostPorts);
+    }
+    for ring in board.axes.iter().filter_map(|axis| axis.quadrature) {
+        let port = ring.first.pin.port;
+        if ring.second.pin.port != port || ring.index.pin.port != port {
+            report(Fault::QuadraturePorts);
+        }
     }
     let relay = board.relay.channel;
     if board.brakes.is_some_and(|brakes| brakes.channel == relay) {
@@ -250,7 +262,7 @@ mod tests {
 
     use super::*;
     use crate::boards::{BOARDS, BTT_OCTOPUS, NUCLEO_F446RE};
-    use crate::{Level, Output, wire};
+    use crate::{Level, Output, QuadratureWires, wire};
 
     fn faults(board: &Board) -> Vec<Fault> {
         let mut faults = Vec::new();
@@ -321,6 +333,10 @@ mod tests {
             drivers.spi.spi = 1;
         }
         board.host_rx.pin = Pin::new('D', 6);
+        board.axes[1].quadrature = board.axes[1].quadrature.map(|ring| QuadratureWires {
+            index: wire(Pin::new('C', 13), ""),
+            ..ring
+        });
         if let Some(brakes) = &mut board.brakes {
             brakes.channel = board.relay.channel;
         }
@@ -333,6 +349,7 @@ mod tests {
             Fault::DriversSpi(1),
             Fault::SharedChannel(1),
             Fault::HostPorts,
+            Fault::QuadraturePorts,
         ] {
             assert!(found.contains(&fault), "{fault}: {found:?}");
         }

@@ -124,6 +124,17 @@ pub struct Encoder {
     pub data: Wire,
 }
 
+/// A quadrature ring's line receiver. All three are on one port, so that they are read at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QuadratureWires {
+    /// The wave that leads upwards: A.
+    pub first: Wire,
+    /// The other one: B.
+    pub second: Wire,
+    /// Once a turn: Z, the reference mark.
+    pub index: Wire,
+}
+
 /// What belongs to one axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Axis {
@@ -133,8 +144,10 @@ pub struct Axis {
     pub edge: StepEdge,
     /// Direction input of the driver.
     pub direction: Wire,
-    /// The ring.
+    /// The ring, where it is absolute.
     pub encoder: Encoder,
+    /// The ring, where it gives waves and an index, and the board has pins for that.
+    pub quadrature: Option<QuadratureWires>,
     /// To ground when closed; the pin has a pull-up.
     pub home_switch: Wire,
 }
@@ -260,6 +273,13 @@ impl Board {
                 plain(names.step, axis.step, Some(Level::Low));
             }
         }
+        for (axis, names) in self.axes.iter().zip(AXIS_ROLES) {
+            if let Some(ring) = axis.quadrature {
+                plain(names.first, ring.first, None);
+                plain(names.second, ring.second, None);
+                plain(names.index, ring.index, None);
+            }
+        }
         for enable in self.enables {
             let off = match enable.on {
                 Level::High => Level::Low,
@@ -341,6 +361,9 @@ struct AxisRoles {
     direction: &'static str,
     clock: &'static str,
     data: &'static str,
+    first: &'static str,
+    second: &'static str,
+    index: &'static str,
     home_switch: &'static str,
     alarm: &'static str,
     driver_line: &'static str,
@@ -352,6 +375,9 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         direction: "θ direction",
         clock: "θ encoder clock",
         data: "θ encoder data",
+        first: "θ ring A",
+        second: "θ ring B",
+        index: "θ ring index",
         home_switch: "θ home switch",
         alarm: "θ driver's alarm",
         driver_line: "θ driver's UART or select",
@@ -361,6 +387,9 @@ const AXIS_ROLES: [AxisRoles; 2] = [
         direction: "φ direction",
         clock: "φ encoder clock",
         data: "φ encoder data",
+        first: "φ ring A",
+        second: "φ ring B",
+        index: "φ ring index",
         home_switch: "φ home switch",
         alarm: "φ driver's alarm",
         driver_line: "φ driver's UART or select",

@@ -9,7 +9,7 @@ use gonia_acquire::link::{
     LinkError, RemoteController, StreamTransport, Ticket, calibrate_axis, is_uncalibrated,
 };
 use gonia_protocol::NODE_ANY;
-use gonia_protocol::message::{ControllerState, RequestOutcome};
+use gonia_protocol::message::{ControllerState, RequestOutcome, RequestRefusal};
 use gonia_protocol::settings::{Axis, MEANINGS, Meaning};
 use std::io::{BufRead, IsTerminal, Write};
 
@@ -341,10 +341,15 @@ fn set(arm: &mut RemoteController, axis: Axis, name: &str, value: i32) -> Result
         bail!("{name} {value}: must lie in {min}..={max}");
     }
     let result = arm.set_setting(axis, *key, value);
-    if let Err(LinkError::Refused { refusal, .. }) = &result {
-        bail!("{name} {value} refused: {refusal}; it must also agree with the other settings");
+    match &result {
+        Err(LinkError::Refused { refusal, .. }) => match refusal {
+            RequestRefusal::Value => bail!(
+                "{name} {value} refused: {refusal}; it must also agree with the other settings"
+            ),
+            _ => bail!("{name} {value} refused: {refusal}"),
+        },
+        _ => Ok(result?),
     }
-    Ok(result?)
 }
 
 fn spread(from_deg: f64, to_deg: f64, stands: u16) -> Result<Vec<i32>> {

@@ -1,25 +1,35 @@
 //! `gonia export`: dense BRDFs in other people's formats.
 
-use crate::colours::read_colours;
 use crate::progress::Progress;
+use crate::remarks;
+use crate::say::outln;
 use crate::table::{self, bytes, count};
 use anyhow::{Result, bail};
 use gonia_formats::check_output;
-use gonia_formats::foreign::{ExportSettings, ForeignWriter, export_format};
-use gonia_pipeline::export::{ExportError, export};
-use std::path::PathBuf;
+use gonia_formats::checksum::of_channels;
+use gonia_formats::dense::{ERRORS_OF, read_dense_channels};
+use gonia_formats::export::{ExportFormat, check_new_folder, export_format, export_table};
+use gonia_pipeline::export::{ExportError, ExportSource, Places, export};
+use gonia_rig::DenseChannels;
+use std::path::{Path, PathBuf};
 
 /// Writes a dense BRDF in the format of another program, and says how far that file is from it.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia export dense.exr -o fabric.bsdf                    for Mitsuba's 'measured'\n  gonia export dense.exr -o fabric.xml --format tensortree  for Radiance\n\nThe file is read back and compared with the table at random directions: median, 99th percentile and RMS of\n|ln| of their ratio. Formats mean 1/sr; of a relative BRDF say by what factor it becomes so."
+    after_long_help = "Example:\n  gonia export dense.exr -o fabric.bsdf                      for Mitsuba's 'measured'\n  gonia export dense.exr -o fabric.xml --format tensortree4  for Radiance\n  gonia export --list-formats                                what there is\n\nThe file is read back and compared with the table: median, 99th percentile and RMS of |ln| of their ratio, at\nrandom directions, or at the file's own where its readers agree on nothing else. Most formats mean 1/sr; of a\nrelative BRDF say by what factor it becomes so."
 )]
 pub struct Export {
     /// The dense BRDF
-    dense: PathBuf,
+    #[arg(required_unless_present = "list_formats")]
+    dense: Option<PathBuf>,
     /// The file to write
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "list_formats"
+    )]
+    output: Option<PathBuf>,
     /// The format, where the ending does not tell it
     #[arg(long, value_name = "NAME")]
     format: Option<String>,
@@ -29,69 +39,134 @@ pub struct Export {
     /// Take a relative BRDF for 1/sr after multiplying it by this factor
     #[arg(long, value_name = "FACTOR")]
     assume_scale: Option<f64>,
+    /// Error bars, as gonia fill --error wrote them, for formats that hold them
+    #[arg(long, value_name = "ERR.exr")]
+    error: Option<PathBuf>,
+    /// Print the formats, a row each, and end
+    #[arg(long)]
+    list_formats: bool,
 }
 
 impl Export {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let (format, writer) = export_format(&self.output, self.format.as_deref())?;
-        let settings = self.settings(writer)?;
+        let (false, Some(dense), Some(output)) = (self.list_formats, &self.dense, &self.output)
+        else {
+            for row in export_table() {
+                outln!("{}", row.join("\t").replace('`', ""));
+            }
+            return Ok(());
+        };
+        let format = export_format(output, self.format.as_deref())?;
+        let resolution = self.resolution(format)?;
         if let Some(factor) = self.assume_scale
             && !(factor > 0.0 && factor.is_finite())
         {
             bail!("--assume-scale {factor}: give a factor above 0");
         }
-        check_output(&self.output, &[&self.dense])?;
+        if format.is_folder {
+            check_new_folder(output)?;
+        } else {
+            let inputs: Vec<&Path> = [Some(dense), self.error.as_ref()]
+                .into_iter()
+                .flatten()
+                .map(PathBuf::as_path)
+                .collect();
+            check_output(output, &inputs)?;
+        }
         let progress = Progress::new();
-        let dense = progress.stage("reading the dense BRDF", |_| read_colours(&self.dense))?;
-        let grid = dense.brdf.grid();
+        let source = progress.stage("reading the dense BRDF", |_| self.source(dense))?;
+        let grid = source.dense.grid;
         let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
-        let error = progress.stage("writing and reading back", |_| {
-            export(
-                dense,
-                &self.output,
-                (format, writer),
-                &settings,
-                self.assume_scale,
-            )
+        let (error, said) = progress.stage("writing and reading back", |_| {
+            export(source, output, format, resolution)
         })?;
-        let mut rows = vec![("format".to_owned(), format.name.to_owned())];
-        if let Some(resolution) = &writer.resolution {
-            let text = format!("{} {}", settings.resolution, resolution.of);
+        remarks::print(&said);
+        let mut rows = vec![("format".to_owned(), format.title.to_owned())];
+        if let Some(chosen) = &format.resolution {
+            let text = format!("{resolution} {}", chosen.of);
             rows.push(("resolution".into(), text));
         }
         rows.push(("against the table".into(), text_of(&error)));
         if last_deg < 90.0 {
-            let text = format!("the value there ({last_deg} degrees is the table's last)");
+            let text = match error.places {
+                Places::Anywhere => "the value there",
+                Places::OfTheFile => "nothing",
+            };
+            let text = format!("{text} ({last_deg} degrees is the table's last)");
             rows.push((format!("beyond {last_deg} degrees"), text));
         }
-        let size = std::fs::metadata(&self.output).map_or(0, |file| file.len());
-        let text = format!("{}, {}", self.output.display(), bytes(size));
+        let text = format
+            .provenance
+            .unwrap_or("lost: the format has no place for it");
+        rows.push(("provenance".into(), text.into()));
+        let text = format!("{}, {}", output.display(), bytes(size_of(output)));
         rows.push(("written".into(), text));
         table::print(&rows);
         Ok(())
     }
 
-    fn settings(&self, writer: &ForeignWriter) -> Result<ExportSettings> {
-        let resolution = match (self.resolution, &writer.resolution) {
+    fn source<'a>(&self, path: &'a Path) -> Result<ExportSource<'a>> {
+        let dense = read_dense_channels(path)?;
+        let errors = self.error.as_deref().map(|errors| {
+            let read = read_dense_channels(errors)?;
+            if fits(&dense, &read) {
+                return Ok(read);
+            }
+            bail!(
+                "--error {}: belongs to another table than {} (grid, channels, scale or checksum differ); give the error bars that were written with it",
+                errors.display(),
+                path.display()
+            )
+        });
+        Ok(ExportSource {
+            errors: errors.transpose()?,
+            dense,
+            path,
+            scale_by: self.assume_scale,
+        })
+    }
+
+    fn resolution(&self, format: &ExportFormat) -> Result<usize> {
+        Ok(match (self.resolution, &format.resolution) {
             (Some(n), Some(r)) if (r.least..=r.most).contains(&n) => n,
             (Some(n), Some(r)) => {
                 bail!("--resolution {n}: give {} to {} {}", r.least, r.most, r.of)
             }
             (Some(n), None) => bail!(
                 "--resolution {n}: a file of the format {} has one size; leave it out",
-                writer.name
+                format.name
             ),
             (None, resolution) => resolution.as_ref().map_or(0, |r| r.default),
-        };
-        Ok(ExportSettings { resolution })
+        })
+    }
+}
+
+/// Whether error bars are those of a table: of its grid, channels and scale, and of its checksum where they hold one.
+fn fits(dense: &DenseChannels, errors: &DenseChannels) -> bool {
+    let of = errors.provenance.get(ERRORS_OF);
+    dense.grid == errors.grid
+        && dense.channels == errors.channels
+        && dense.scale == errors.scale
+        && of.is_none_or(|of| *of == of_channels(dense))
+}
+
+/// Bytes of a file, or of all files in a folder.
+fn size_of(path: &Path) -> u64 {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flatten().map(|entry| size_of(&entry.path())).sum(),
+        Err(_) => std::fs::metadata(path).map_or(0, |file| file.len()),
     }
 }
 
 /// How far the file is from the table.
 fn text_of(error: &ExportError) -> String {
+    let places = match error.places {
+        Places::Anywhere => "pairs of directions",
+        Places::OfTheFile => "values, at the file's own directions",
+    };
     let mut text = format!(
-        "|ln| median {:.4}, p99 {:.4}, RMS {:.4} of {} pairs of directions",
+        "|ln| median {:.4}, p99 {:.4}, RMS {:.4} of {} {places}",
         error.median,
         error.p99,
         error.rms,

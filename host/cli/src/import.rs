@@ -14,8 +14,8 @@ use gonia_pipeline::provenance::{Provenance, of_this_program};
 use gonia_rig::{DenseFile, Scale};
 use std::path::{Path, PathBuf};
 
-/// Brings a material of the UTIA database (.bin, anisotropic) or of MERL (.binary, isotropic) onto
-/// gonia's grid, so that every other command can compare, fit and draw it; one of Ngan, Durand and
+/// Brings a material of the UTIA database (.bin), of MERL (.binary, isotropic), of Mitsuba or Zemax (.bsdf) or of
+/// Radiance (.xml) onto gonia's grid, so that every other command can compare, fit and draw it; one of Ngan, Durand and
 /// Matusik (.dat, anisotropic), which is full of holes, becomes samples for `gonia fill`.
 #[derive(clap::Args)]
 #[command(

@@ -237,48 +237,16 @@ pub(crate) struct SampleFormat {
 /// See [`crate::samples::read_samples`].
 pub(crate) type ReadSamples = fn(&Path) -> Result<ChannelsRead, FileError>;
 
-/// A format of another group, which `gonia import` reads and, some of them, `gonia export` writes.
+/// A format of another group, which `gonia import` reads.
 pub struct ForeignFormat {
     /// Whose format it is and its ending: `UTIA .bin`.
     pub name: &'static str,
     /// What its files hold, and how they are read.
     pub content: ForeignContent,
-    /// How a dense BRDF is written in it; absent where it is only read.
-    pub write: Option<ForeignWriter>,
 }
 
 /// Reads another group's file.
 pub type ReadForeign = fn(&Path) -> Result<Box<dyn ForeignBrdf>, FileError>;
-
-/// How `gonia export` writes a format of another group.
-pub struct ForeignWriter {
-    /// Its name on the command line.
-    pub name: &'static str,
-    /// Reads a file as readers of the format do, to say how far it is from its table.
-    pub read: ReadForeign,
-    /// Writes a dense BRDF whole, which may fail with one line that names the file.
-    pub write: fn(&Path, &DenseFile, &ExportSettings) -> Result<(), FileError>,
-    /// What its size can be chosen by; `None` where it has one size.
-    pub resolution: Option<Resolution>,
-}
-
-/// A number that the size of a file, and with it its error, is chosen by.
-pub struct Resolution {
-    /// Where nothing else is asked for.
-    pub default: usize,
-    /// The least that makes sense.
-    pub least: usize,
-    /// The most that readers and memory bear.
-    pub most: usize,
-    /// What it counts.
-    pub of: &'static str,
-}
-
-/// How a dense BRDF is exported.
-pub struct ExportSettings {
-    /// The format's [`Resolution`], within its bounds; of no meaning where it has none.
-    pub resolution: usize,
-}
 
 /// What a file of another group holds.
 pub enum ForeignContent {

@@ -9,6 +9,7 @@
 //! | [`dense`] | dense BRDFs, whole, by rows or cell by cell, in any format of the table |
 //! | [`samples`] | samples, in any format of the table |
 //! | [`foreign`] | other groups' measurements, to be imported |
+//! | [`export`] | dense BRDFs in other programs' formats |
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
 //! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
 //! | [`checksum`] | what ties a note to the file that it was written of |
@@ -31,6 +32,7 @@ mod dng;
 mod encoding;
 mod error;
 mod error_exr;
+pub mod export;
 mod exr_blocks;
 mod exr_channels;
 mod exr_colours;

@@ -17,11 +17,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-const N_HALF: usize = 90;
-const N_DIFF: usize = 90;
-const N_PHI: usize = 180;
-const PLANE: usize = N_HALF * N_DIFF * N_PHI;
-const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+pub(crate) const N_HALF: usize = 90;
+pub(crate) const N_DIFF: usize = 90;
+pub(crate) const N_PHI: usize = 180;
+pub(crate) const PLANE: usize = N_HALF * N_DIFF * N_PHI;
+pub(crate) const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// The database's format.
 pub(super) static FORMAT: Format = Format {
@@ -32,9 +32,8 @@ pub(super) static FORMAT: Format = Format {
         name: "MERL .binary",
         content: ForeignContent::Brdf {
             scale: Some(Scale::Absolute),
-            read: |path| Ok(Box::new(read_merl(path)?)),
+            read,
         },
-        write: None,
     }),
 };
 
@@ -45,6 +44,14 @@ struct Merl {
     measured: Vec<bool>,
     /// Evaluations at a place that was not.
     interpolated: AtomicU64,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// One line naming it: of another size, or without a measurement.
+pub(crate) fn read(path: &Path) -> Result<Box<dyn ForeignBrdf>, FileError> {
+    Ok(Box::new(read_merl(path)?))
 }
 
 fn read_merl(path: &Path) -> Result<Merl, FileError> {

@@ -27,7 +27,6 @@ pub(super) static FORMAT: Format = Format {
     content: Content::Foreign(ForeignFormat {
         name: "Ngan, Durand and Matusik .dat",
         content: ForeignContent::Samples { read: read_ngan },
-        write: None,
     }),
 };
 

@@ -1,13 +1,15 @@
 //! The table of all formats, and how a file's format is recognised.
 
 use crate::format::{Content, Format};
-use crate::{FileError, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia};
+use crate::{
+    FileError, dense_exr, export, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia,
+};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 /// Every format. The first one of each kind is written where a name has no known ending.
-static FORMATS: [&Format; 8] = [
+static FORMATS: [&Format; 10] = [
     &dense_exr::FORMAT,
     &samples_npy::FORMAT,
     &samples_csv::FORMAT,
@@ -16,6 +18,8 @@ static FORMATS: [&Format; 8] = [
     &merl::FORMAT,
     &ngan::FORMAT,
     &rgl::FORMAT,
+    &export::radiance::FORMAT,
+    &export::zemax::FORMAT,
 ];
 
 /// The formats of a kind, in the order of the table.
@@ -35,8 +39,17 @@ pub(super) fn format_of_file(path: &Path) -> Result<Option<&'static Format>, Fil
         let start = start.as_deref().unwrap_or_default();
         !format.magic.is_empty() && start.starts_with(format.magic)
     };
-    let format = FORMATS.into_iter().find(is_begun_so);
-    match (format.or_else(|| format_of_name(path)), start) {
+    // Of two with one ending, one is known by its first bytes: a file without them is the other.
+    let by_name = || {
+        let mut named = FORMATS
+            .into_iter()
+            .filter(|format| is_named_so(format, path));
+        let first = named.next()?;
+        let is_other = start.is_ok() && !first.magic.is_empty();
+        Some(named.find(|_| is_other).unwrap_or(first))
+    };
+    let format = FORMATS.into_iter().find(is_begun_so).or_else(by_name);
+    match (format, start) {
         (Some(format), _) => Ok(Some(format)),
         (None, Ok(_)) => Ok(None),
         (None, Err(error)) => Err(FileError::reading(path, &error)),
@@ -45,10 +58,15 @@ pub(super) fn format_of_file(path: &Path) -> Result<Option<&'static Format>, Fil
 
 /// The format that a file of this name has, by its ending in either case.
 pub(super) fn format_of_name(path: &Path) -> Option<&'static Format> {
-    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
-    FORMATS
-        .into_iter()
-        .find(|format| format.endings.contains(&ending.as_str()))
+    FORMATS.into_iter().find(|format| is_named_so(format, path))
+}
+
+fn is_named_so(format: &Format, path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    format
+        .endings
+        .iter()
+        .any(|of_format| ending.eq_ignore_ascii_case(of_format))
 }
 
 /// The endings of a kind, as a remedy lists them: `.npy or .csv`.
@@ -87,10 +105,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_formats_share_an_ending_or_first_bytes() {
+    fn formats_are_told_apart_by_endings_or_by_first_bytes() {
         for (k, format) in FORMATS.iter().enumerate() {
             for other in &FORMATS[..k] {
-                assert!(format.endings.iter().all(|e| !other.endings.contains(e)));
+                let is_shared = format.endings.iter().any(|e| other.endings.contains(e));
+                let is_told = !other.magic.is_empty() && format.magic.is_empty();
+                assert!(!is_shared || is_told, "{}", format.name);
                 let (a, b) = (format.magic, other.magic);
                 let differ = !a.starts_with(b) && !b.starts_with(a);
                 assert!(a.is_empty() || b.is_empty() || differ, "{}", format.name);

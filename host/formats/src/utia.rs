@@ -13,10 +13,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 const N_THETA: usize = 6;
-const N_PHI: usize = 48;
-const THETA_STEP_DEG: f64 = 15.0;
-const PHI_STEP_DEG: f64 = 7.5;
-const SIDE: usize = N_THETA * N_PHI;
+pub(crate) const N_PHI: usize = 48;
+pub(crate) const THETA_STEP_DEG: f64 = 15.0;
+pub(crate) const PHI_STEP_DEG: f64 = 7.5;
+pub(crate) const SIDE: usize = N_THETA * N_PHI;
 const COUNT: usize = 3 * SIDE * SIDE;
 
 /// The database's format. Public readers disagree on the scale of its values.
@@ -26,11 +26,7 @@ pub(super) static FORMAT: Format = Format {
     magic: &[],
     content: Content::Foreign(ForeignFormat {
         name: "UTIA .bin",
-        content: ForeignContent::Brdf {
-            scale: None,
-            read: |path| Ok(Box::new(read_utia(path)?)),
-        },
-        write: None,
+        content: ForeignContent::Brdf { scale: None, read },
     }),
 };
 
@@ -41,6 +37,14 @@ struct Utia {
     negative: u64,
     /// Evaluations with a channel that came out below 0.
     clipped: AtomicU64,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// One line naming it: of another size, or without a value above 0.
+pub(crate) fn read(path: &Path) -> Result<Box<dyn ForeignBrdf>, FileError> {
+    Ok(Box::new(read_utia(path)?))
 }
 
 fn read_utia(path: &Path) -> Result<Utia, FileError> {

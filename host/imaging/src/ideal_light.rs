@@ -42,13 +42,27 @@ impl IdealLight {
         }
     }
 
+    /// The logarithm of [`Self::irradiance`], for less; −∞ where the light is below the horizon.
+    pub fn ln_irradiance(&self, at_mm: [f64; 2]) -> f64 {
+        let light = self.placement.at_mm;
+        let d = [light[0] - at_mm[0], light[1] - at_mm[1], light[2]];
+        let inverse2 = 1.0 / dot(d, d);
+        let even = d[2] * inverse2.sqrt() * self.distance_mm * self.distance_mm * inverse2;
+        let ln_beam = self.beam.map_or(0.0, |beam| self.ln_beam_towards(&beam, d));
+        even.max(0.0).natural_log() + ln_beam
+    }
+
     /// The beam towards a point from which the light is `to_light` away (mm), relative to its centre's.
     fn beam_towards(&self, beam: &[f64; 5], to_light: Vec3) -> f64 {
+        self.ln_beam_towards(beam, to_light).exponential()
+    }
+
+    fn ln_beam_towards(&self, beam: &[f64; 5], to_light: Vec3) -> f64 {
         let depth = dot(to_light, self.placement.back);
         let u = -dot(to_light, self.placement.right) / depth;
         let v = -dot(to_light, self.placement.up) / depth;
         let [a, b, aa, ab, bb] = beam;
-        (a * u + b * v + aa * u * u + ab * u * v + bb * v * v).exponential()
+        a * u + b * v + aa * u * u + ab * u * v + bb * v * v
     }
 }
 
@@ -76,6 +90,8 @@ mod tests {
         assert!((factor([0.0; 2]) - 1.0).abs() < 1e-12);
         // At φ = 0 the light's right is +y, and up is −x.
         assert!((factor([0.0, 220.0]) - (0.5f64 * 0.2).exponential()).abs() < 1e-12);
+        let ln = beam.ln_irradiance([50.0, 220.0]);
+        assert!((ln - beam.irradiance([50.0, 220.0]).natural_log()).abs() < 1e-12);
         let up = -0.25 * 0.2 - 2.0 * 0.04;
         assert!((factor([-220.0, 0.0]) - up.exponential()).abs() < 1e-12);
     }

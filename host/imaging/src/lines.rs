@@ -1,5 +1,6 @@
 //! The neighbourhoods of the four lines: pixels along runs across each predicted line.
 
+use crate::profile::Growth;
 use crate::{IdealLight, luminance};
 use gonia_brdf::Elementary;
 use gonia_rig::{CameraModel, Frame, Homography, Target};
@@ -31,9 +32,10 @@ const CLEAR_OF_CROSSING_PX: f64 = 4.0;
 
 /// So many pixels to either side of a line the light is looked at.
 const LIGHT_PX: f64 = 1.5;
-/// Light that changes by a larger share a pixel is none that a straight line describes: it stays positive over the
-/// pixels of a fit.
+/// Light that changes by a larger share a pixel is none that a parabola describes: it stays positive over the
+/// pixels of a fit. Likewise over the square of pixels.
 const MOST_GROWTH: f64 = 0.15;
+const MOST_SQUARE: f64 = 0.02;
 
 /// Places on a line at which its row is looked up, less one.
 const PLACES_A_LINE: usize = 8;
@@ -93,8 +95,8 @@ pub struct Station {
     pub s: f64,
     /// Pixels outwards a millimetre of the target.
     pub px_per_mm: f64,
-    /// By which share the light grows in a pixel outwards.
-    pub light: f64,
+    /// How the light changes outwards.
+    pub light: Growth,
     /// Its samples.
     pub run: std::ops::Range<usize>,
 }
@@ -102,7 +104,7 @@ pub struct Station {
 /// What is across a line at one of its places.
 struct Across {
     px_per_mm: f64,
-    light: f64,
+    light: Growth,
 }
 
 /// One pixel of a run.
@@ -114,6 +116,25 @@ pub struct RunSample {
     pub value: f32,
     /// Its place in the frame.
     pub pixel: [u16; 2],
+}
+
+/// Runs go down the columns under a flat line (0) and along the rows beside a steep one (1).
+fn main_axis(along: [f64; 2]) -> usize {
+    usize::from(along[0].abs() < along[1].abs())
+}
+
+/// How the light changes outwards that is so strong [`LIGHT_PX`] inwards of a line, on it, and as far outwards.
+fn growth([inner, here, outer]: [f64; 3]) -> Growth {
+    if inner <= 0.0 || here <= 0.0 || outer <= 0.0 {
+        return Growth::default();
+    }
+    let linear = (outer - inner) / (2.0 * LIGHT_PX * here);
+    let square = (outer - 2.0 * here + inner) / (2.0 * LIGHT_PX * LIGHT_PX * here);
+    Growth {
+        linear: linear.clamp(-MOST_GROWTH, MOST_GROWTH),
+        square: square.clamp(-MOST_SQUARE, MOST_SQUARE),
+        aside: 0.0,
+    }
 }
 
 /// How far from a line its strip reaches, when `step` is a millimetre outwards at its middle, pixels.
@@ -207,22 +228,23 @@ impl LineStrip {
             && length.is_finite()
             && reach > 0.0
         {
+            let cross = 1 - main_axis(along);
+            // By how far a run goes along the line with each pixel outwards.
+            let aside = along[cross] / outward[cross];
             let across = |p: [f64; 2]| {
                 let mm = target_from_px.apply(p);
                 let d = target_to_px.jacobian(mm)[side.axis];
-                let beside = |px: f64| {
-                    let at = [0, 1].map(|i| p[i] + px * outward[i]);
-                    light.irradiance(target_from_px.apply(at))
+                let towards = |way: [f64; 2]| {
+                    [-LIGHT_PX, 0.0, LIGHT_PX].map(|px| {
+                        let at = [0, 1].map(|i| p[i] + px * way[i]);
+                        light.irradiance(target_from_px.apply(at))
+                    })
                 };
-                let (inner, here, outer) = (beside(-LIGHT_PX), beside(0.0), beside(LIGHT_PX));
-                let growth = (outer - inner) / (2.0 * LIGHT_PX * here);
-                let is_lit = inner > 0.0 && here > 0.0 && outer > 0.0;
                 Across {
                     px_per_mm: (d[0] * outward[0] + d[1] * outward[1]).abs(),
-                    light: if is_lit {
-                        growth.clamp(-MOST_GROWTH, MOST_GROWTH)
-                    } else {
-                        0.0
+                    light: Growth {
+                        aside: aside * growth(towards(along)).linear,
+                        ..growth(towards(outward))
                     },
                 }
             };
@@ -240,8 +262,7 @@ impl LineStrip {
         reach: f64,
         across: impl Fn([f64; 2]) -> Across,
     ) {
-        // Runs go down the columns under a flat line and along the rows beside a steep one.
-        let main = usize::from(self.along[0].abs() < self.along[1].abs());
+        let main = main_axis(self.along);
         let cross = 1 - main;
         let half = (reach_px / self.outward[cross].abs()).ceil() as i64;
         let extent = self.length * self.along[main].abs() * reach;

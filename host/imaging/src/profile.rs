@@ -6,7 +6,7 @@
 //! station, so that shading, highlights and folds cannot shift the line; the material's edge is in
 //! the model because at grazing views it comes within a pixel of the line. There a pixel is centimetres
 //! of the target, over which a near light changes by some per cent: each of the three is the blur of
-//! something lit by 1 + g·τ, with the light's growth g as the rig has it.
+//! something lit by 1 + g·τ + h·τ², with the light's growth g and its change h as the rig has it.
 
 use crate::lines::{Edges, RunSample};
 use gonia_brdf::Elementary;
@@ -17,6 +17,9 @@ const WINDOW_SIGMAS: f64 = 3.0;
 /// How far it goes into the material, likewise.
 const MATERIAL_SIGMAS: f64 = 1.5;
 
+/// Pixels that differ by this share of the brightest are none that nothing falls on, however uneven the light is.
+const DIFFERS: f64 = 0.25;
+
 /// Edges of line and material about a station.
 #[derive(Clone, Copy)]
 pub struct LineProfile {
@@ -25,8 +28,69 @@ pub struct LineProfile {
     pub s: f64,
     /// Standard deviation of the blur, pixels.
     pub sigma: f64,
-    /// By which share of that at the line's middle the light grows in a pixel outwards.
-    pub light: f64,
+    /// How the light changes outwards.
+    pub light: Growth,
+}
+
+/// Light across a line: 1 + `linear`·τ + `square`·τ² of that in the line's middle, τ pixels outwards.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Growth {
+    pub linear: f64,
+    pub square: f64,
+    /// A run of pixels is a piece of a row or a column, and goes along the line too where that is oblique: by so
+    /// much the light grows with each of its pixels outwards for that.
+    pub aside: f64,
+}
+
+impl Growth {
+    fn at(&self, tau: f64) -> f64 {
+        1.0 + tau * (self.linear + tau * self.square)
+    }
+
+    fn is_even(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// By how much the light differs over a run, at most [`DIFFERS`].
+    fn over(&self, [inner, outer]: [f64; 2]) -> f64 {
+        let at = |tau: f64| self.at(tau) * (1.0 + self.aside * tau);
+        (at(outer) - at(inner)).abs().min(DIFFERS)
+    }
+}
+
+/// The blur about τ of what is lit and lies on one side of an edge, with its derivatives.
+struct Blurred {
+    value: f64,
+    /// By τ − edge where the light stays.
+    slope: f64,
+    /// By ln σ.
+    blur: f64,
+}
+
+impl Blurred {
+    /// Of what lies inwards of an edge: ∫ (1 + g·u + h·u²) du over u < edge, weighed by the normal density about τ.
+    /// With u = τ + σ·w and z = (edge − τ)/σ, ∫φ = Φ(z), ∫w·φ = −φ(z) and ∫w²·φ = Φ(z) − z·φ(z) over w < z.
+    fn inwards_of(edge: f64, tau: f64, sigma: f64, light: Growth) -> Self {
+        let z = (edge - tau) / sigma;
+        let (share, density) = normal(z);
+        let first = -density * sigma;
+        let second = (share - z * density) * sigma * sigma;
+        let (slope_here, square) = (light.linear + 2.0 * light.square * tau, light.square);
+        let lit = light.at(edge);
+        Self {
+            value: light.at(tau) * share + slope_here * first + square * second,
+            slope: -lit * density / sigma,
+            blur: -z * lit * density + slope_here * first + 2.0 * square * second,
+        }
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self {
+            value: factor * self.value,
+            slope: factor * self.slope,
+            blur: factor * self.blur,
+        }
+    }
 }
 
 /// The fit of one station's amplitudes, and what it tells about the line's place and the blur.
@@ -55,8 +119,6 @@ impl LineProfile {
         let outer = far + margin;
         // A gap wide enough to stand in keeps the material out of it.
         let with_material = near - margin < edge + WINDOW_SIGMAS * self.sigma;
-        // On a dark desk a narrow line that stands alone is lit evenly.
-        let light = if with_material { self.light } else { 0.0 };
         // Little of the material: it may have a pattern of its own.
         let inner = if with_material {
             edge - MATERIAL_SIGMAS * self.sigma - 1.0
@@ -73,40 +135,35 @@ impl LineProfile {
             if n == MAX_RUN {
                 break;
             }
-            rows[n] = self.row(sample, tau, (with_material, light));
+            rows[n] = self.row(sample, tau, with_material);
             n += 1;
         }
         // Where the pixels differ by less than the light should alone there is nothing that it falls on: a
         // saturated frame, a lid. What the light's growth leaves of an even run is no line.
-        let differ = (outer - inner) * light.abs();
-        if light != 0.0 && !varies(&rows[..n], differ) {
+        if !self.light.is_even() && !varies(&rows[..n], self.light.over([inner, outer])) {
             return None;
         }
         fit_rows(&rows[..n], with_material)
     }
 
-    fn row(&self, sample: &RunSample, tau: f64, (with_material, light): (bool, f64)) -> Row {
-        let inverse = 1.0 / self.sigma;
+    fn row(&self, sample: &RunSample, tau: f64, with_material: bool) -> Row {
+        let light = self.light;
         let [near, far, edge] = self.edges.at(f64::from(sample.s));
-        let z1 = (tau - near) * inverse;
-        let z2 = (tau - far) * inverse;
-        let ((c1, d1), (c2, d2)) = (normal(z1), normal(z2));
-        // The light at an edge, relative to that in the middle of the line.
-        let lit = |at: f64| 1.0 + light * at;
-        let (here, spread) = (lit(tau), light * self.sigma);
-        let (lit1, lit2) = (lit(near) * d1, lit(far) * d2);
+        let aside = 1.0 + light.aside * tau;
+        let of = |edge: f64| Blurred::inwards_of(edge, tau, self.sigma, light).times(aside);
+        let (inner, outer) = (of(near), of(far));
+        let desk = aside * (light.at(tau) + light.square * self.sigma * self.sigma);
         let mut row = Row {
             value: f64::from(sample.value),
-            basis: [here * (c1 - c2) + spread * (d1 - d2), here, 0.0],
-            slope: [(lit1 - lit2) * inverse, 0.0],
-            blur: [z2 * lit2 - z1 * lit1 + spread * (d1 - d2), 0.0],
+            basis: [outer.value - inner.value, desk, 0.0],
+            slope: [outer.slope - inner.slope, 0.0],
+            blur: [outer.blur - inner.blur, 0.0],
         };
         if with_material {
-            let z = (edge - tau) * inverse;
-            let (c, d) = normal(z);
-            row.basis[2] = here * c - spread * d;
-            row.slope[1] = -lit(edge) * d * inverse;
-            row.blur[1] = -(z * lit(edge) + spread) * d;
+            let material = of(edge);
+            row.basis[2] = material.value;
+            row.slope[1] = material.slope;
+            row.blur[1] = material.blur;
         }
         row
     }
@@ -241,7 +298,7 @@ mod tests {
             edges,
             s: 0.0,
             sigma,
-            light: 0.0,
+            light: Growth::default(),
         }
     }
 
@@ -255,7 +312,7 @@ mod tests {
                     value: 0.0,
                     pixel: [0; 2],
                 };
-                let row = profile.row(&sample, t - at, (true, profile.light));
+                let row = profile.row(&sample, t - at, true);
                 let value: f64 = (0..3).map(|i| amplitudes[i] * row.basis[i]).sum();
                 sample.value = value as f32;
                 sample
@@ -286,7 +343,11 @@ mod tests {
     fn light_that_grows_across_a_line_does_not_move_it() {
         // At a grazing view a pixel is centimetres wide: under a near light some per cent a pixel.
         let truth = LineProfile {
-            light: -0.05,
+            light: Growth {
+                linear: -0.05,
+                square: 0.004,
+                aside: 0.0,
+            },
             ..profile(0.12, 0.8, 0.5)
         };
         // Each thin slice of the target is lit as its place is, and blurred.
@@ -303,7 +364,7 @@ mod tests {
                 let material = if u < edge { amplitudes[2] } else { 0.0 };
                 let z = (t - u) / truth.sigma;
                 let blur = normal(z).1 / truth.sigma;
-                1e-3 * blur * (1.0 + truth.light * u) * (line + amplitudes[1] + material)
+                1e-3 * blur * truth.light.at(u) * (line + amplitudes[1] + material)
             });
             weighed.sum()
         };
@@ -319,15 +380,16 @@ mod tests {
             }
             at
         };
-        let (with, without) = (
-            placed(truth),
-            placed(LineProfile {
-                light: 0.0,
-                ..truth
-            }),
-        );
-        assert!(with.abs() < 1e-3, "{with}");
-        assert!(without.abs() > 0.02, "{without}");
+        let with = |light| placed(LineProfile { light, ..truth });
+        let straight = Growth {
+            square: 0.0,
+            ..truth.light
+        };
+        let (all, straight, even) = (with(truth.light), with(straight), with(Growth::default()));
+        println!("{all} {straight} {even}");
+        assert!(all.abs() < 1e-3, "{all}");
+        assert!(straight.abs() > 3e-3, "{straight}");
+        assert!(even.abs() > 0.02, "{even}");
     }
 
     #[test]
@@ -335,7 +397,13 @@ mod tests {
         let truth = profile(0.12, 0.8, 0.5);
         let mut even = run(&truth, 0.0, [0.25, 0.01, 0.4]);
         even.iter_mut().for_each(|sample| sample.value = 0.5);
-        let lit = |light: f64| LineProfile { light, ..truth }.fit(&even, |_| 0.0);
+        let lit = |linear: f64| {
+            let light = Growth {
+                linear,
+                ..Growth::default()
+            };
+            LineProfile { light, ..truth }.fit(&even, |_| 0.0)
+        };
         assert!(lit(-0.05).is_none() && lit(0.05).is_none());
         let fit = lit(0.0).unwrap();
         assert!(fit.gain <= 1e-12, "{}", fit.gain);

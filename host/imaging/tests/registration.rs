@@ -457,3 +457,47 @@ fn a_frame_turned_by_the_camera_is_found_out_from_straight_above_by_the_mark() {
         }
     }
 }
+
+/// RMS distance of pieces of lines from where the target has them, pixels, in frames without noise.
+fn placed_px(px: usize) -> f64 {
+    let mut scene = Scene::of_fabric(px);
+    (scene.noise, scene.beam, scene.occluder) = (None, None, None);
+    let rig = scene.geometry.to_rig();
+    let (registrar, camera) = (Registrar::new(&rig), CameraModel::new(&rig));
+    let (mut sum, mut count) = (0.0, 0);
+    // Azimuths at which lines are oblique in the frame, lights from all sides.
+    let views = [
+        [0.0, 44.0],
+        [0.0, 315.0],
+        [15.0, 70.0],
+        [30.0, 130.0],
+        [45.0, 24.0],
+    ];
+    let lights = [[45.0, 10.0], [60.0, 337.0], [75.0, 160.0], [85.0, 65.0]];
+    for [tv, pv] in views {
+        for [ti, pi] in lights {
+            let pose = Pose::from_deg([ti, pi, tv, pv]);
+            let frame = scene.frame(Role::Reference, pose, 0);
+            let map = camera.predict(pose.view, CameraShift::default());
+            let back = map.inverse().unwrap();
+            for point in registrar.line_points(&frame, pose, Search::Near) {
+                let at = back.apply(camera.undistort(point.pixel));
+                let off = point.sign * at[point.axis] - rig.target.line_offset_mm;
+                sum += (off * point.px_per_mm).powi(2);
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 500, "{count}");
+    (sum / f64::from(count)).sqrt()
+}
+
+#[test]
+fn a_near_light_moves_no_line_however_oblique_it_is_in_the_frame() {
+    // Material beside the lines, and lines that stand alone.
+    for px in [240, 500] {
+        let rms = placed_px(px);
+        println!("{px}: {rms}");
+        assert!(rms < 8e-4, "{px}: {rms}");
+    }
+}

@@ -77,6 +77,17 @@ pub enum Error {
         /// The format's name.
         format: &'static str,
     },
+    /// An export of uncertainties to a format that has no place for them.
+    #[error(
+        "the format {format} has no place for uncertainties: leave --error out, or give --format netcdf or zarr"
+    )]
+    NoUncertainties {
+        /// The format's name.
+        format: &'static str,
+    },
+    /// A table whose channels are not of one size.
+    #[error("the table's planes differ in size; make it again")]
+    UnequalPlanes,
     /// What the data say of their uncertainties is unsound.
     #[error(transparent)]
     Budget(#[from] NoBudget),

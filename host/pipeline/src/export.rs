@@ -1,18 +1,31 @@
-//! Dense BRDFs in other groups' formats, and what is lost on the way.
+//! Dense BRDFs in other programs' formats, and what is lost on the way.
 
+use crate::colours::colours_of;
 use crate::error::Error;
-use gonia_brdf::{DenseBrdf, Direction, Elementary};
-use gonia_formats::foreign::{ExportSettings, ForeignFormat, ForeignWriter};
-use gonia_rig::{DenseFile, Scale};
+use gonia_brdf::{DenseBrdf, Direction, Elementary, Pose, Sample};
+use gonia_formats::export::{ExportFormat, ExportSettings, Holds, How, Meaning};
+use gonia_formats::foreign::ForeignBrdf;
+use gonia_rig::{Channels, DenseChannels, DenseFile, Remark, Scale};
 use rayon::prelude::*;
 use std::path::Path;
 
 /// Pairs of directions at which a file that was written is compared with its table.
 const TESTS: u32 = 20_000;
 
+/// A table that is exported.
+pub struct ExportSource<'a> {
+    /// The table.
+    pub dense: DenseChannels,
+    /// The file that it was read from, for messages.
+    pub path: &'a Path,
+    /// Its standard uncertainties, of the same grid and channels, where they are known.
+    pub errors: Option<DenseChannels>,
+    /// Takes a relative BRDF for 1/sr after multiplying it.
+    pub scale_by: Option<f64>,
+}
+
 /// How far a file in another format is from the table that it was made of, as a reader of that format has
-/// it: |ln| of the ratio of values, over random directions within the table's polar angles, in which
-/// both are positive.
+/// it: |ln| of the ratio of values at directions in which both are positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExportError {
     /// Median of |ln|.
@@ -25,75 +38,201 @@ pub struct ExportError {
     pub tests: usize,
     /// Pairs at which only the table has a positive value.
     pub lost: usize,
+    /// Which directions those are.
+    pub places: Places,
 }
 
-/// Writes a dense BRDF in another group's format, and compares the file, read back, with the table.
-/// `scale_by` takes a relative BRDF for 1/sr after multiplying it.
+/// Directions at which a file is compared with its table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Places {
+    /// Spread over the table's polar angles: what a reader finds anywhere.
+    Anywhere,
+    /// The file's own.
+    OfTheFile,
+}
+
+/// Writes a dense BRDF in another program's format, and compares the file, read back, with the table. What is
+/// to be said of the material in that format comes with it.
 ///
 /// # Errors
-/// The BRDF is relative, the format means 1/sr, and no `scale_by` is given; the file cannot be written or
-/// read back.
+/// The BRDF is relative, the format means 1/sr, and no `scale_by` is given; there are uncertainties, and the
+/// format has no place for them; the file cannot be written or read back.
 pub fn export(
-    mut dense: DenseFile,
+    source: ExportSource<'_>,
     path: &Path,
-    (format, writer): (&ForeignFormat, &ForeignWriter),
-    settings: &ExportSettings,
-    scale_by: Option<f64>,
-) -> Result<ExportError, Error> {
-    if dense.scale == Scale::Relative {
-        let factor = scale_by.ok_or(Error::RelativeExport {
-            format: format.name,
-        })?;
-        dense = scaled(&dense, factor);
-    }
-    (writer.write)(path, &dense, settings)?;
-    let written = (writer.read)(path)?;
-    let grid = dense.brdf.grid();
-    let last_deg = grid.direction(grid.n_directions() - 1).theta_deg();
-    let logs: Vec<Option<f64>> = (0..TESTS)
-        .into_par_iter()
-        .map(|test| {
-            let [light, view] = directions(test, last_deg);
-            let table = dense.brdf.lookup(light, view);
-            let read = written.eval(light.to_vec3(), view.to_vec3());
-            let mean = |values: [f64; 3]| (values[0] + values[1] + values[2]) / 3.0;
-            let (table, read) = (mean(table.map(f64::from)), mean(read));
-            (table > 0.0 && read > 0.0).then(|| (read / table).natural_log().abs())
-        })
+    format: &ExportFormat,
+    resolution: usize,
+) -> Result<(ExportError, Vec<Remark>), Error> {
+    let ExportSource {
+        mut dense,
+        mut errors,
+        ..
+    } = source;
+    let mut remarks: Vec<Remark> = too_coarse(&dense, source.path, format, resolution)
+        .into_iter()
         .collect();
+    if dense.scale == Scale::Relative {
+        match (source.scale_by, format.means) {
+            (Some(factor), _) => {
+                scale(&mut dense, factor);
+                errors.iter_mut().for_each(|errors| scale(errors, factor));
+            }
+            (None, Meaning::Stated) => {}
+            (None, Meaning::Absolute) => {
+                return Err(Error::RelativeExport {
+                    format: format.title,
+                });
+            }
+        }
+    }
+    let error = match (&format.how, errors) {
+        (How::Table { write, read }, errors) => {
+            write(path, &dense, errors.as_ref())?;
+            of_table(&dense, &read(path)?)
+        }
+        (_, Some(_)) => {
+            return Err(Error::NoUncertainties {
+                format: format.title,
+            });
+        }
+        (How::Brdf { write, read }, None) => {
+            let (dense, settings) = colours(dense, source.path, format, resolution, &mut remarks)?;
+            remarks.extend(write(path, &dense, &settings)?);
+            of_brdf(&dense.brdf, read(path)?.as_ref())
+        }
+        (How::Samples { write, read }, None) => {
+            let (dense, settings) = colours(dense, source.path, format, resolution, &mut remarks)?;
+            remarks.extend(write(path, &dense, &settings)?);
+            of_samples(&dense.brdf, &read(path)?)
+        }
+    };
+    Ok((error, remarks))
+}
+
+/// What a file would pretend to know between the nodes of a coarse table.
+fn too_coarse(
+    dense: &DenseChannels,
+    path: &Path,
+    format: &ExportFormat,
+    resolution: usize,
+) -> Option<Remark> {
+    let (step, of_format) = (dense.grid.step_deg(), (format.step_deg)(resolution));
+    (of_format > 0.0 && step > 2.0 * of_format).then(|| {
+        Remark::new(
+            path.display(),
+            format_args!(
+                "its step of {step} degrees is coarser than the {of_format} degrees of {}: the file looks finer than it is",
+                format.title
+            ),
+            "fill a finer grid (gonia fill --step) for more than interpolated values",
+        )
+    })
+}
+
+/// The table as the colours, or the one value, that a format holds.
+fn colours(
+    dense: DenseChannels,
+    path: &Path,
+    format: &ExportFormat,
+    resolution: usize,
+    remarks: &mut Vec<Remark>,
+) -> Result<(DenseFile, ExportSettings), Error> {
+    let is_single = dense.channels == Channels::Single;
+    let (mut dense, said) = colours_of(dense, path).ok_or(Error::UnequalPlanes)?;
+    remarks.extend(said);
+    if format.holds == Holds::One && !is_single {
+        let grid = dense.brdf.grid();
+        let brdf = DenseBrdf::from_fn(grid, |light, view| {
+            [gonia_render::color::luminance(dense.brdf.at(light, view)); 3]
+        });
+        dense.brdf = brdf;
+    }
+    let is_one_value = match format.holds {
+        Holds::Colours => false,
+        Holds::One => true,
+        Holds::ColoursOrOne | Holds::Any => is_single,
+    };
+    let settings = ExportSettings {
+        resolution,
+        is_one_value,
+    };
+    Ok((dense, settings))
+}
+
+/// The same BRDF in 1/sr, by a factor that somebody says; the provenance keeps it.
+fn scale(dense: &mut DenseChannels, factor: f64) {
+    let by = |value: &mut f32| *value = (f64::from(*value) * factor) as f32;
+    dense.planes.iter_mut().flatten().for_each(by);
+    dense.scale = Scale::Absolute;
+    dense.provenance.insert(
+        "scale_assumed".into(),
+        format!("1/sr after multiplying by {factor}"),
+    );
+}
+
+fn of_brdf(table: &DenseBrdf, written: &dyn ForeignBrdf) -> ExportError {
+    let grid = table.grid();
+    let last_deg = grid.direction(grid.n_directions() - 1).theta_deg();
+    let of_test = |test| {
+        let [light, view] = directions(test, last_deg);
+        let read = written.eval(light.to_vec3(), view.to_vec3());
+        ln(table, light, view, read)
+    };
+    let logs = (0..TESTS).into_par_iter().map(of_test).collect();
+    figures(logs, Places::Anywhere)
+}
+
+fn of_samples(table: &DenseBrdf, written: &[Sample]) -> ExportError {
+    let of_sample = |sample: &Sample| {
+        let angles = [
+            sample.theta_i_deg,
+            sample.phi_i_deg,
+            sample.theta_v_deg,
+            sample.phi_v_deg,
+        ];
+        let Pose { light, view } = Pose::from_deg(angles.map(f64::from));
+        ln(table, light, view, sample.rgb.map(f64::from))
+    };
+    figures(
+        written.par_iter().map(of_sample).collect(),
+        Places::OfTheFile,
+    )
+}
+
+fn of_table(table: &DenseChannels, written: &DenseChannels) -> ExportError {
+    let pairs = table.planes.iter().zip(&written.planes);
+    let cells = pairs.flat_map(|(table, read)| table.iter().zip(read));
+    let of_cell = |(table, read): (&f32, &f32)| match table.to_bits() == read.to_bits() {
+        true => Some(0.0),
+        false if *table > 0.0 && *read > 0.0 => Some(f64::from(read / table).natural_log().abs()),
+        false => None,
+    };
+    figures(cells.map(of_cell).collect(), Places::OfTheFile)
+}
+
+/// |ln| of the mean of channels against the table's, where both are positive.
+fn ln(table: &DenseBrdf, light: Direction, view: Direction, read: [f64; 3]) -> Option<f64> {
+    let mean = |values: [f64; 3]| (values[0] + values[1] + values[2]) / 3.0;
+    let table = mean(table.lookup(light, view).map(f64::from));
+    let read = mean(read);
+    (table > 0.0 && read > 0.0).then(|| (read / table).natural_log().abs())
+}
+
+fn figures(logs: Vec<Option<f64>>, places: Places) -> ExportError {
     let mut found: Vec<f64> = logs.iter().flatten().copied().collect();
-    found.sort_by(f64::total_cmp);
+    found.par_sort_unstable_by(f64::total_cmp);
     let quantile = |share: f64| {
         let at = (share * found.len() as f64) as usize;
         found.get(at).copied().unwrap_or(f64::NAN)
     };
     let squares: f64 = found.iter().map(|ln| ln * ln).sum();
-    Ok(ExportError {
+    ExportError {
         median: quantile(0.5),
         p99: quantile(0.99),
         rms: (squares / found.len() as f64).sqrt(),
         tests: logs.len(),
         lost: logs.len() - found.len(),
-    })
-}
-
-/// The same BRDF in 1/sr, by a factor that somebody says; the provenance keeps it.
-fn scaled(dense: &DenseFile, factor: f64) -> DenseFile {
-    let at = |light, view| {
-        dense
-            .brdf
-            .at(light, view)
-            .map(|v| (f64::from(v) * factor) as f32)
-    };
-    let mut provenance = dense.provenance.clone();
-    provenance.insert(
-        "scale_assumed".into(),
-        format!("1/sr after multiplying by {factor}"),
-    );
-    DenseFile {
-        brdf: DenseBrdf::from_fn(dense.brdf.grid(), at),
-        scale: Scale::Absolute,
-        provenance,
+        places,
     }
 }
 

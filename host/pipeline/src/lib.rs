@@ -37,7 +37,6 @@ pub mod chart;
 mod colours;
 pub mod compare;
 mod compare_bands;
-mod doubts;
 mod error;
 pub mod export;
 mod fill;
@@ -46,12 +45,12 @@ pub mod process;
 mod progress;
 pub mod provenance;
 mod samples;
+mod warnings;
 
 pub use calibrate::{CalibrateError, Calibrated, calibrate};
 pub use colours::colours_of;
 pub use compare::{CompareError, Options, Side, Table, compare};
 pub use compare_bands::{BandFigures, compare_bands};
-pub use doubts::DirectionalAlbedo;
 pub use error::Error;
 pub use fill::{
     Behind, FillAccount, FillCounts, FillMethod, FillOptions, Filled, FilledBins, FitOfSamples,
@@ -59,3 +58,4 @@ pub use fill::{
 };
 pub use progress::{Cancelled, Progress, Step, silent};
 pub use samples::{samples_of, samples_of_folder, samples_of_sampled};
+pub use warnings::DirectionalAlbedo;

@@ -9,9 +9,11 @@ use gonia_brdf::fit::{FitSettings, StandardFamily};
 use gonia_brdf::interpolate::Preset;
 use gonia_brdf::{Brdf, SymmetryKind};
 use gonia_formats::dense::ChannelErrors;
+use gonia_formats::export::export_format;
 use gonia_formats::rig_toml::write_rig;
 use gonia_formats::{CaptureFolder, FileError};
 use gonia_pipeline::budget::{budget_in, combine_errors};
+use gonia_pipeline::export::{ExportSource, export as export_file};
 use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model};
 use gonia_pipeline::{
     Error, FillOptions, FitOfSamples, Options, Side, Table, calibrate as calibrate_rig, colours_of,
@@ -32,6 +34,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(query_samples, module)?)?;
     module.add_function(wrap_pyfunction!(compare, module)?)?;
     module.add_function(wrap_pyfunction!(fit, module)?)?;
+    module.add_function(wrap_pyfunction!(export, module)?)?;
     module.add_function(wrap_pyfunction!(render, module)?)?;
     module.add_function(wrap_pyfunction!(set_threads, module)?)
 }
@@ -246,6 +249,54 @@ fn query_samples(
         Values::new(values, vec![found.len(), n])
     };
     Ok((of(0), of(1)))
+}
+
+/// Writes a dense BRDF in another program's format: how far the file, read back, is from it.
+#[pyfunction]
+fn export<'py>(
+    py: Python<'py>,
+    dense: &Dense,
+    path: PathBuf,
+    format: Option<&str>,
+    resolution: Option<usize>,
+    assume_scale: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let format = export_format(&path, format).map_err(to_py)?;
+    let resolution = match (resolution, &format.resolution) {
+        (Some(n), Some(of)) if (of.least..=of.most).contains(&n) => n,
+        (Some(n), Some(of)) => {
+            let wanted = format!("give {} to {} {}", of.least, of.most, of.of);
+            return Err(to_py(format!("resolution {n}: {wanted}")));
+        }
+        (Some(n), None) => {
+            let size = "a file of this format has one size; leave it out";
+            return Err(to_py(format!("resolution {n}: {size}")));
+        }
+        (None, of) => of.as_ref().map_or(0, |of| of.default),
+    };
+    if let Some(factor) = assume_scale.filter(|of| !(of.is_finite() && *of > 0.0)) {
+        return Err(to_py(format!(
+            "assume_scale {factor}: give a factor above 0"
+        )));
+    }
+    let file = dense.file.clone();
+    let (error, remarks) = run_silently(py, || {
+        let source = ExportSource {
+            dense: file,
+            path: Path::new("the dense BRDF"),
+            errors: None,
+            scale_by: assume_scale,
+        };
+        export_file(source, &path, format, resolution)
+    })?;
+    let told = PyDict::new(py);
+    told.set_item("format", format.name)?;
+    told.set_item("median", error.median)?;
+    told.set_item("p99", error.p99)?;
+    told.set_item("rms", error.rms)?;
+    told.set_item("lost", error.lost)?;
+    told.set_item("remarks", texts(&remarks))?;
+    Ok(told)
 }
 
 /// A dense BRDF as colours.

@@ -192,6 +192,13 @@ def test_bands_compare_fit_and_render(dense, tmp_path):
     assert rgb.shape == (32, 32, 3) and cover.max() == 1 and np.isfinite(rgb).all()
 
 
+def test_exports_say_what_they_lost(dense, tmp_path):
+    found = dense.export(tmp_path / "f.bsdf")
+    assert (tmp_path / "f.bsdf").stat().st_size > 1000 and 0 <= found["median"] < 0.2
+    with pytest.raises(gonia.GoniaError, match="bsdf"):
+        dense.export(tmp_path / "f.unknown")
+
+
 def test_xarray_has_names_units_and_uncertainty(dense):
     pytest.importorskip("xarray")
     data = dense.to_xarray()

@@ -5,7 +5,8 @@
 use gonia_firmware::controller::ArmController;
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::node::{ControllerNode, identity};
 use gonia_firmware::steps::{End, Period, StepProgress};
@@ -33,14 +34,20 @@ impl Hardware for Pins {
         }
     }
     fn halt(&mut self, _: Axis) {}
+    fn has_encoder(&self, _: Axis, _: EncoderKind) -> bool {
+        true
+    }
     fn encoder_word(&mut self, _: Axis, _: EncoderSetup) -> Result<EncoderWord, EncoderLost> {
         match self.sensors & 7 {
             0 | 4 => Err(EncoderLost::Silent),
             1 => Ok(u32::MAX.into()),
             2 => Err(EncoderLost::Invalid),
+            5 if self.sensors & 8 != 0 => Err(EncoderLost::Edge),
+            5 => Err(EncoderLost::Index),
             _ => Ok(EncoderWord {
                 counts: u32::from(self.sensors) << 10,
                 warns: self.sensors & 8 != 0,
+                index: (self.sensors & 16 != 0).then_some(u32::from(self.sensors)),
             }),
         }
     }

@@ -99,6 +99,20 @@ fn at_rest(bus: DriverBus, strike: fn(&mut DriverChip)) -> TestBench {
 }
 
 #[test]
+fn a_data_line_that_is_low_is_a_driver_that_does_not_answer() {
+    let silent = FaultCode::DRIVER_SILENT;
+    // From the start, and once its settings are there.
+    let mut bench = with_drivers(DriverBus::Spi);
+    chip(&mut bench, Axis::Phi).trouble = DriverTrouble::DataLow;
+    bench.run_us(SETUP_US);
+    assert_eq!(bench.state(), ControllerState::Fault(silent));
+    let bench = at_rest(DriverBus::Spi, |chip| {
+        chip.trouble = DriverTrouble::DataLow;
+    });
+    assert_eq!(bench.state(), ControllerState::Fault(silent));
+}
+
+#[test]
 fn every_trouble_of_a_driver_is_a_fault_of_its_own() {
     type Spoils = fn(&mut DriverChip);
     let rows: [(Spoils, FaultCode); 5] = [

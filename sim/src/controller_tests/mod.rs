@@ -3,6 +3,7 @@
 mod drivers;
 mod encoders;
 mod homing;
+mod quadrature;
 mod safety;
 
 use gonia_firmware::controller::{Answer, ArmController};
@@ -28,9 +29,13 @@ struct TestBench {
 impl TestBench {
     /// θ near its home switch, and this φ.
     fn new(phi: PlantConfig) -> Self {
+        Self::with_arm([PlantConfig::worm_axis(-5e6, 3e6), phi])
+    }
+
+    fn with_arm(axes: [PlantConfig; 2]) -> Self {
         let mut bench = Self {
             controller: ArmController::new(0, None),
-            arm: SimulatedArm::new([PlantConfig::worm_axis(-5e6, 3e6), phi], 3),
+            arm: SimulatedArm::new(axes, 3),
             now_us: 0,
             request: 0,
             host_is_there: true,

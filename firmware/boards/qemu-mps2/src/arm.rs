@@ -2,7 +2,8 @@
 
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::steps::{Period, StepProgress};
 use gonia_protocol::settings::Axis;
@@ -34,6 +35,10 @@ impl Hardware for EmulatedArm {
 
     fn halt(&mut self, axis: Axis) {
         steps::halt(axis);
+    }
+
+    fn has_encoder(&self, axis: Axis, kind: EncoderKind) -> bool {
+        self.0.has_encoder(axis, kind)
     }
 
     fn encoder_word(

@@ -3,7 +3,8 @@
 use embassy_stm32::gpio::Input;
 use gonia_firmware::driver::DriverBus;
 use gonia_firmware::hardware::{
-    DriverAnswer, DriverBytes, EncoderLost, EncoderSetup, EncoderWord, Hardware, NotSaved,
+    DriverAnswer, DriverBytes, EncoderKind, EncoderLost, EncoderSetup, EncoderWord, Hardware,
+    NotSaved,
 };
 use gonia_firmware::spi_encoder::SpiEncoder;
 use gonia_firmware::steps::{Period, StepProgress};
@@ -13,7 +14,7 @@ use gonia_protocol::settings::Axis;
 use crate::drivers::Drivers;
 use crate::encoder::EncoderSpi;
 use crate::sectors::FlashSectors;
-use crate::{alive, now_us, pulses, steps};
+use crate::{alive, now_us, pulses, quadrature, steps};
 
 /// Pins, encoders and memory; steps are with their timers. Pairs are θ and φ.
 pub struct ArmPins {
@@ -59,11 +60,19 @@ impl Hardware for ArmPins {
         steps::halt(axis);
     }
 
+    fn has_encoder(&self, axis: Axis, kind: EncoderKind) -> bool {
+        kind != EncoderKind::Quadrature || quadrature::has_pins(axis)
+    }
+
     fn encoder_word(
         &mut self,
         axis: Axis,
         setup: EncoderSetup,
     ) -> Result<EncoderWord, EncoderLost> {
+        if setup.kind == EncoderKind::Quadrature {
+            return quadrature::word(axis, setup.turn);
+        }
+        quadrature::leave(axis);
         self.encoders[axis.index()].word(now_us(), setup)
     }
 

@@ -1,32 +1,26 @@
 //! The wires of motors' drivers that are set by them: a TMC2209's by TIM1's interrupt, which works a plain pin, a
 //! TMC5160's by an SPI.
 //!
-//! TIM1 counts only while bytes are under way. Its interrupt comes behind those of steps and trigger, which may delay
-//! it by microseconds: a sixth of a bit lasts 17.
+//! The interrupt (`tick`) comes behind those of steps and trigger, which may delay it by microseconds: a sixth of a bit
+//! lasts 17.
 
 use core::cell::RefCell;
 
-use critical_section::Mutex;
+use critical_section::{CriticalSection, Mutex};
 use embassy_stm32::gpio::{AfType, Pull};
-use embassy_stm32::interrupt::typelevel::{Interrupt, TIM1_UP_TIM10};
-use embassy_stm32::interrupt::{self, Priority};
 use embassy_stm32::pac::TIM1;
 use embassy_stm32::pac::spi::Spi;
 use embassy_stm32::pac::spi::vals::{Br, Cpha, Cpol, Mstr};
-use embassy_stm32::pac::timer::regs::SrAdv;
-use embassy_stm32::pac::timer::vals::Urs;
 use embassy_stm32::{pac, peripherals, rcc};
 use gonia_firmware::driver::{DriverBus, tmc5160};
 use gonia_firmware::hardware::{DriverAnswer, DriverBytes};
-use gonia_firmware::single_wire::{Exchange, SingleWire, TICK_HZ};
+use gonia_firmware::single_wire::{Exchange, SingleWire};
 use gonia_pins::signals::Signal;
 use gonia_pins::{DriverSpi, DriverWires, Level};
 use gonia_protocol::settings::Axis;
 
 use crate::gpio::{DRIVEN, Line, give, open_drain};
 
-/// TIM1's clock.
-const TIM1_HZ: u32 = 168_000_000;
 /// Around a select line's edges, cycles of the processor: 1 µs, where the chip asks for less than 0.1.
 const SELECT_CYCLES: u32 = 168;
 
@@ -55,16 +49,8 @@ pub struct Drivers {
 }
 
 impl Drivers {
-    /// Starts timer and SPI.
+    /// Starts lines and SPI.
     pub fn start(wires: DriverWires) -> Self {
-        rcc::enable_and_reset::<peripherals::TIM1>();
-        TIM1.arr()
-            .write(|w| w.set_arr((TIM1_HZ / TICK_HZ - 1) as u16));
-        TIM1.cr1().write(|w| w.set_urs(Urs::COUNTER_ONLY));
-        TIM1.dier().write(|w| w.set_uie(true));
-        TIM1_UP_TIM10::set_priority(Priority::P2);
-        // SAFETY: the handler shares data with the main loop through critical sections only.
-        unsafe { TIM1_UP_TIM10::enable() };
         Self {
             lines: wires.lines.map(open_drain),
             spi: start_spi(wires.spi),
@@ -181,19 +167,17 @@ fn begin(axis: Axis, line: Line, request: DriverBytes, answer_len: usize) -> boo
     })
 }
 
-#[embassy_stm32::interrupt]
-fn TIM1_UP_TIM10() {
-    TIM1.sr().write_value(SrAdv(!1));
-    critical_section::with(|cs| {
-        let one = &mut *ONE_WIRE.borrow_ref_mut(cs);
-        let Some(line) = one.line else { return };
-        let is_free = one.wire.tick(line.is_high());
-        if is_free != one.is_free {
-            one.is_free = is_free;
-            line.set(if is_free { Level::High } else { Level::Low });
-        }
-        if !one.wire.is_busy() {
-            TIM1.cr1().modify(|w| w.set_cen(false));
-        }
-    });
+/// A sixth of a bit on the one wire; whether bytes are under way.
+#[inline]
+pub fn on_tick(cs: CriticalSection) -> bool {
+    let one = &mut *ONE_WIRE.borrow_ref_mut(cs);
+    let Some(line) = one.line.filter(|_| one.wire.is_busy()) else {
+        return false;
+    };
+    let is_free = one.wire.tick(line.is_high());
+    if is_free != one.is_free {
+        one.is_free = is_free;
+        line.set(if is_free { Level::High } else { Level::Low });
+    }
+    one.wire.is_busy()
 }

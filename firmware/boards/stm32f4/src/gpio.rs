@@ -17,6 +17,39 @@ pub fn switch(wire: Wire) -> Input<'static> {
     Input::new(any(wire.pin), Pull::Up)
 }
 
+/// Three inputs on one port, read at one moment.
+pub struct Inputs {
+    port: Gpio,
+    masks: [u32; 3],
+}
+
+impl Inputs {
+    /// Inputs with pull-ups: an open collector gives levels as well as a line receiver does. All are on the first one's
+    /// port.
+    pub fn pulled_up(wires: [Wire; 3]) -> Self {
+        for wire in wires {
+            core::mem::forget(switch(wire));
+        }
+        let [first, ..] = wires;
+        Self {
+            port: any(first.pin).block(),
+            masks: wires.map(|wire| 1 << wire.pin.number),
+        }
+    }
+
+    /// Whether each is high.
+    #[inline]
+    pub fn read(&self) -> [bool; 3] {
+        let levels = self.port.idr().read().0;
+        let [first, second, third] = self.masks;
+        [
+            levels & first != 0,
+            levels & second != 0,
+            levels & third != 0,
+        ]
+    }
+}
+
 /// A plain output, at this level from now on.
 pub fn output(wire: Wire, level: Level) -> Line {
     let line = Line::of(wire.pin);

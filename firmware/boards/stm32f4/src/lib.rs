@@ -17,8 +17,10 @@ mod drivers;
 mod encoder;
 mod gpio;
 mod pulses;
+mod quadrature;
 mod sectors;
 mod steps;
+mod tick;
 mod time;
 
 use core::panic::PanicInfo;
@@ -84,6 +86,8 @@ pub async fn run(of: &'static Pins) -> ! {
         .map(|axis| SpiEncoder::new(EncoderSpi::start(axis.encoder)));
     pulses::start(of);
     steps::start(&of.axes);
+    quadrature::start(&of.axes);
+    tick::start();
     let pins = ArmPins {
         encoders,
         home_switches: of.axes.map(|axis| gpio::switch(axis.home_switch)),

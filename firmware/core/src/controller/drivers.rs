@@ -8,10 +8,13 @@ use crate::driver::{DriverMotion, DriverWatch};
 use crate::hardware::Hardware;
 use crate::settings::ControllerSettings;
 
-/// Whether the board has what the settings of a driver ask for.
-pub(super) fn can_be_set(settings: &ControllerSettings, hardware: &impl Hardware) -> bool {
-    let mut drivers = Axis::BOTH.iter().filter_map(|&axis| settings.driver(axis));
-    drivers.all(|driver| hardware.has_driver_bus(driver.bus))
+/// Whether the board has the pins that the settings of drivers and encoders ask for.
+pub(super) fn has_pins(settings: &ControllerSettings, hardware: &impl Hardware) -> bool {
+    Axis::BOTH.into_iter().all(|axis| {
+        let driver = settings.driver(axis);
+        driver.is_none_or(|driver| hardware.has_driver_bus(driver.bus))
+            && hardware.has_encoder(axis, settings.encoder(axis).kind)
+    })
 }
 
 impl ArmController {

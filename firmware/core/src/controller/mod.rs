@@ -236,6 +236,13 @@ impl ArmController {
             ControllerState::Moving | ControllerState::Settling => {
                 self.tick_motion(now_us, hardware)
             }
+            // Moved by hand over its index: from here on the status shows angles from there.
+            ControllerState::Unhomed if !self.is_moving() => {
+                let drives = self.drives.iter_mut();
+                drives
+                    .filter(|drive| drive.has_new_index())
+                    .for_each(AxisDrive::forget_encoder);
+            }
             // It may still be slowing down.
             ControllerState::Fault(_) => {
                 self.check_following(now_us, hardware);

@@ -7,12 +7,14 @@ use gonia_protocol::message::{
 };
 use gonia_protocol::settings::{Axis, Key};
 
-use super::drivers::can_be_set;
+use super::drivers::has_pins;
 use super::motion::is_at_home;
 use super::{Answer, ArmController, has_alarm};
 use crate::axis::AxisDrive;
 use crate::hardware::Hardware;
 use crate::homing::Homing;
+use crate::quadrature::MOST_COUNTS_S;
+use crate::settings::BadValue;
 use crate::train::TriggerTrain;
 
 /// A start beyond a soft limit by less than this comes from the in-position window, or from the gear's play
@@ -248,9 +250,12 @@ impl ArmController {
         let mut changed = self.settings.clone();
         changed
             .set(setting.axis, key, setting.value)
-            .map_err(|_| RequestRefusal::Value)?;
-        if !can_be_set(&changed, hardware) {
-            return Err(RequestRefusal::Value);
+            .map_err(|bad| match bad {
+                BadValue::Value => RequestRefusal::Value,
+                BadValue::CountRate(counts_s) => RequestRefusal::CountRate(counts_s, MOST_COUNTS_S),
+            })?;
+        if !has_pins(&changed, hardware) {
+            return Err(RequestRefusal::NoPins);
         }
         self.settings = changed;
         self.apply_to_driver(setting.axis, key);

@@ -23,8 +23,8 @@ pub fn write(register: u8, value: u32) -> DriverBytes {
     [register | WRITE, a, b, c, d].into_iter().collect()
 }
 
-/// The value in what the second of two datagrams brought. A line that rests at either level is no chip: the
-/// byte of state has neither all bits set nor, with the data, none.
+/// The value in what the second of two datagrams brought. A line that rests high is no chip; one that is low reads zeros,
+/// which some registers hold.
 pub fn value(answer: &[u8]) -> Result<u32, Garbled> {
     match *answer.get(DATAGRAM_LEN..).unwrap_or_default() {
         [0xFF, 0xFF, 0xFF, 0xFF, 0xFF] => Err(Garbled),

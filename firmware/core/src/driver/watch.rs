@@ -169,6 +169,7 @@ impl DriverWatch {
             let value = match hardware.driver_answer(axis, setup.bus) {
                 DriverAnswer::Waiting => return None,
                 DriverAnswer::Silent => None,
+                DriverAnswer::Bytes(bytes) if is_dead(setup.bus, op, &bytes) => None,
                 DriverAnswer::Bytes(bytes) => setup.value(say(op), &bytes).ok(),
             };
             self.is_asked = false;
@@ -317,6 +318,13 @@ impl DriverWatch {
         self.phase = Phase::Failed;
         code
     }
+}
+
+/// Whether nobody has answered, though as many bytes came as were awaited: a TMC5160's data line that is low reads
+/// zeros, which are an answer of most registers, but not of these, whatever was written to them and after a reset.
+fn is_dead(bus: DriverBus, op: Op, answer: &[u8]) -> bool {
+    let is_never_zero = matches!(op, Op::Version(_) | Op::Holds(CHOPCONF, _));
+    bus == DriverBus::Spi && is_never_zero && answer.iter().all(|&byte| byte == 0)
 }
 
 fn say(op: Op) -> Say {

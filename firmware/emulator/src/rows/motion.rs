@@ -15,11 +15,12 @@ use crate::rig::Rig;
 use crate::world::RingKind;
 
 /// The pointing limit, degrees.
-const POINTING_DEG: f64 = 0.03;
-const MOVE_US: u64 = 60_000_000;
+pub const POINTING_DEG: f64 = 0.03;
+/// A move takes less, µs.
+pub const MOVE_US: u64 = 60_000_000;
 
-pub fn three_poses(elf: &Path) -> Result<Outcome> {
-    let (mut rig, poses) = poses(elf, 3)?;
+pub fn a_pose(elf: &Path) -> Result<Outcome> {
+    let (mut rig, poses) = poses(elf, 1)?;
     let edges = edges::on_time(&rig)?;
     let train = trigger::train(&mut rig)?;
     let followed = trigger::follows(&mut rig)?;

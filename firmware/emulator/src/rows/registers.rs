@@ -157,7 +157,7 @@ const PRIORITIES: &[(&str, usize, u8)] = &[
     ("TIM2, φ's steps", 28, 0),
     ("TIM5, θ's steps", 50, 0),
     ("TIM3, time and trigger", 29, 1),
-    ("TIM1, the drivers' wire", 25, 2),
+    ("TIM1, drivers' wire and quadrature rings", 25, 2),
     ("USART2, the host", 38, 4),
 ];
 /// SCB_AIRCR.PRIGROUP up to which all four priority bits preempt.

@@ -21,6 +21,8 @@ const LAST_PULSE_NS: u64 = 10_200_000;
 const CHAIN_OPEN_US: u64 = 20_000;
 /// The watchdog's clock may be slow: 100 ms by 32 kHz are 188 ms by 17 kHz.
 const RESET_NS: u64 = 190_000_000;
+/// So long a stopped chip is watched after that.
+const AFTERWARDS_US: u64 = 300_000;
 /// A register that the step timers' interrupt reads: TIM5_SR.
 const TIM5_SR: u64 = 0x4000_0C10;
 
@@ -55,7 +57,7 @@ pub fn processor_stops(elf: &Path) -> Result<Outcome> {
         "the chain is still closed {} ms later",
         CHAIN_OPEN_US / 1000
     );
-    rig.run_us(1_000_000)?;
+    rig.run_us(AFTERWARDS_US)?;
     let (steps, last_ns) = steps_since(&rig, at_us, before);
     let reset = lock(&rig.world).resets.first().cloned();
     ensure!(
@@ -99,6 +101,7 @@ pub fn hard_fault(elf: &Path) -> Result<Outcome> {
     let (mut rig, _) = under_way(elf)?;
     let (at_us, before) = (rig.now_us(), lock(&rig.world).edges());
     rig.act(Command::Fail(TIM5_SR))?;
+    // The handler waits for the brakes, twice.
     rig.run_us(1_000_000)?;
     let (steps, last_ns) = steps_since(&rig, at_us, before);
     ensure!(

@@ -8,8 +8,8 @@
 //! the step timers makes the edges: no processor, no step.
 
 use crate::{
-    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin, StepEdge,
-    TimerOutput, wire,
+    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin,
+    QuadratureWires, StepEdge, TimerOutput, wire,
 };
 
 /// The bootloader that the board is sold with has the first 32 kB. Settings in the last two sectors, of 128 kB,
@@ -38,6 +38,11 @@ pub const BTT_OCTOPUS: Board = Board {
                 clock: wire(Pin::new('B', 3), "SPI3: SCK"),
                 data: wire(Pin::new('B', 4), "SPI3: MISO"),
             },
+            quadrature: Some(QuadratureWires {
+                first: wire(Pin::new('E', 8), "EXP1-1"),
+                second: wire(Pin::new('E', 7), "EXP1-2"),
+                index: wire(Pin::new('E', 9), "EXP1-3"),
+            }),
             home_switch: wire(Pin::new('G', 12), "STOP_4"),
         },
         Axis {
@@ -49,6 +54,11 @@ pub const BTT_OCTOPUS: Board = Board {
                 clock: wire(Pin::new('E', 12), "EXP1-5"),
                 data: wire(Pin::new('E', 13), "EXP1-6"),
             },
+            quadrature: Some(QuadratureWires {
+                first: wire(Pin::new('E', 14), "EXP1-7"),
+                second: wire(Pin::new('E', 15), "EXP1-8"),
+                index: wire(Pin::new('E', 10), "EXP1-4"),
+            }),
             home_switch: wire(Pin::new('G', 13), "STOP_5"),
         },
     ],

@@ -1,8 +1,8 @@
 //! NUCLEO-F446RE, for drivers in boxes of their own. Places are those of ST's user manual UM1724.
 
 use crate::{
-    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin, StepEdge,
-    TimerOutput, wire,
+    Axis, Board, Crystal, DriverSpi, DriverWires, Encoder, Layout, Level, Output, Pin,
+    QuadratureWires, StepEdge, TimerOutput, wire,
 };
 
 /// Settings in sectors 1 and 2, of 16 kB, which are erased in half a second; the program lies behind them.
@@ -30,6 +30,11 @@ pub const NUCLEO_F446RE: Board = Board {
                 clock: wire(Pin::new('A', 5), "D13"),
                 data: wire(Pin::new('A', 6), "D12"),
             },
+            quadrature: Some(QuadratureWires {
+                first: wire(Pin::new('B', 6), "D10"),
+                second: wire(Pin::new('B', 8), "D15"),
+                index: wire(Pin::new('B', 9), "D14"),
+            }),
             home_switch: wire(Pin::new('C', 0), "A5"),
         },
         Axis {
@@ -41,6 +46,11 @@ pub const NUCLEO_F446RE: Board = Board {
                 clock: wire(Pin::new('B', 13), "CN10-30"),
                 data: wire(Pin::new('B', 14), "CN10-28"),
             },
+            quadrature: Some(QuadratureWires {
+                first: wire(Pin::new('B', 15), "CN10-26"),
+                second: wire(Pin::new('B', 12), "CN10-16"),
+                index: wire(Pin::new('B', 1), "CN10-24"),
+            }),
             home_switch: wire(Pin::new('C', 1), "A4"),
         },
     ],

@@ -11,7 +11,8 @@ mod tensor_file;
 mod warp;
 mod write;
 
-use crate::format::{Content, ForeignContent, ForeignFormat, ForeignWriter, Format, Resolution};
+use crate::export::{ExportFormat, Holds, How, Meaning, Resolution};
+use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use gonia_rig::Scale;
 
 /// The format.
@@ -25,28 +26,49 @@ pub(super) static FORMAT: Format = Format {
             scale: Some(Scale::Absolute),
             read: |path| Ok(Box::new(read::read(path)?)),
         },
-        write: Some(ForeignWriter {
-            name: "rgl",
-            read: |path| Ok(Box::new(read::read(path)?)),
-            write: write::write,
-            resolution: Some(Resolution {
-                default: 32,
-                least: 8,
-                most: 128,
-                of: "places of the half vector along each side of a square",
-            }),
-        }),
     }),
+};
+
+/// How it is exported.
+pub(super) static EXPORT: ExportFormat = ExportFormat {
+    name: "rgl",
+    title: "RGL .bsdf",
+    ending: "bsdf",
+    readers: "Mitsuba 3 (`measured`), Tekari; `gonia import`",
+    means: Meaning::Absolute,
+    holds: Holds::Colours,
+    angles: "lights every 4° and 10° in azimuth; half vectors on a square, denser about the normal",
+    provenance: Some("the field `description`"),
+    is_folder: false,
+    resolution: Some(Resolution {
+        default: 32,
+        least: 8,
+        most: 128,
+        of: "places of the half vector along each side of a square",
+    }),
+    step_deg: |_| 4.0,
+    how: How::Brdf {
+        write: |path, file, settings| {
+            write::write(path, file, settings)?;
+            Ok(Vec::new())
+        },
+        read: |path| Ok(Box::new(read::read(path)?)),
+    },
 };
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::ExportSettings;
+    use crate::export::ExportSettings;
     use gonia_brdf::direction::Vec3;
     use gonia_brdf::{Brdf, DenseBrdf, Direction, Elementary, Grid};
     use gonia_rig::DenseFile;
     use std::collections::BTreeMap;
+
+    const SETTINGS: ExportSettings = ExportSettings {
+        resolution: 32,
+        is_one_value: false,
+    };
 
     /// Not the same with light and view both turned by 180°, nor mirrored.
     struct Lopsided(f64);
@@ -73,7 +95,7 @@ mod tests {
                 scale: Scale::Absolute,
                 provenance: BTreeMap::from([("material".to_owned(), "lopsided".to_owned())]),
             };
-            write::write(&path, &file, &ExportSettings { resolution: 32 }).unwrap();
+            write::write(&path, &file, &SETTINGS).unwrap();
             let read = read::read(&path).unwrap();
             let mut errors = Vec::new();
             for k in 0..2000 {

@@ -3,7 +3,7 @@
 use super::tensor_file::{Field, write_tensor_file};
 use super::warp::theta_of_place;
 use crate::FileError;
-use crate::format::ExportSettings;
+use crate::export::ExportSettings;
 use gonia_brdf::direction::{Vec3, dot};
 use gonia_brdf::{DenseBrdf, Direction, Elementary};
 use gonia_rig::DenseFile;

@@ -2,7 +2,7 @@
 
 use crate::budget::equation::{Effect, Effects};
 use crate::budget::summary::CellBudget;
-use crate::doubts::ring_weights;
+use crate::warnings::ring_weights;
 use gonia_brdf::{Elementary, Grid};
 
 /// Errors of noise and interpolation are one within so many degrees, and independent beyond: as for fits.

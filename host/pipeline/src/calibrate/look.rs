@@ -5,7 +5,6 @@ use crate::calibrate::frames::{Look, Looked};
 use crate::calibrate::lines::LineFrame;
 use crate::calibrate::mirror::MirrorFrame;
 use crate::calibrate::orientation;
-use crate::calibrate::search::first_camera;
 use crate::calibrate::shading::ShadedFrame;
 use crate::process::{FrameRow, FrameSampler, Hidden, Outcome, Role};
 use gonia_formats::checksum;
@@ -13,6 +12,9 @@ use gonia_imaging::{
     Highlight, NoHighlight, Orientation, Registrar, SamplingGrid, Search, find_highlight,
 };
 use gonia_rig::{Remark, Rig};
+
+/// A second look counts when it shows this share of the frames that the first did.
+const MOST_AGAIN: f64 = 0.95;
 
 /// What all chosen frames show.
 #[derive(Clone)]
@@ -29,25 +31,24 @@ pub struct Seen {
     pub remarks: Vec<Remark>,
 }
 
-/// Lines, values of the reference and highlights of all frames.
-pub fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, CalibrateError> {
-    let camera = first_camera(rig, rows, look)?;
-    let registrar = Registrar::new(&camera);
-    let (sampler, grid) = (FrameSampler::new(&camera), SamplingGrid::new(&camera));
+/// Lines, values of the reference and highlights of all frames of a rig that is known to a few pixels.
+pub fn look_near(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, CalibrateError> {
+    let registrar = Registrar::new(rig);
+    let (sampler, grid) = (FrameSampler::new(rig), SamplingGrid::new(rig));
     let looked = look.each(rows, |row, frame| {
         let points = registrar.line_points(frame, row.pose, Search::Near);
         let orientation = registrar.orientation(frame, row.pose.view);
         let sampled = (row.role == Role::Reference && !points.is_empty())
             .then(|| sampler.sample(frame, row, Hidden::Find))
             .filter(|sampled| sampled.report.outcome == Outcome::Locked);
-        let shaded = sampled.and_then(|sampled| ShadedFrame::new(&camera, &grid, &sampled));
+        let shaded = sampled.and_then(|sampled| ShadedFrame::new(rig, &grid, &sampled));
         let lines = LineFrame {
             row: row.clone(),
             points,
         };
         let highlight = (row.role == Role::Mirror && !lines.points.is_empty()).then(|| {
             let registration = registrar.register(frame, row.pose);
-            find_highlight(frame, &registration, &camera.target)
+            find_highlight(frame, &registration, &rig.target)
         });
         Shows {
             lines,
@@ -60,18 +61,26 @@ pub fn find_lines(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen,
     gather(looked)
 }
 
-/// Lines that lie beside a material are placed by the light that falls on both: in the light that was found they
-/// are looked at once more.
+/// Lines that lie beside a material are placed by the light that falls on both, and values of the reference by the
+/// camera: with both as found they are looked at once more. Where that shows far fewer lines or values, they
+/// stay as they are.
 pub fn look_again(
     found: &Rig,
     rows: &[FrameRow],
-    seen: &mut Seen,
+    seen: Seen,
     look: &Look<'_>,
-) -> Result<(), CalibrateError> {
-    let had = |row: &FrameRow| seen.lines.iter().any(|line| line.row == *row);
-    let rows: Vec<FrameRow> = rows.iter().filter(|row| had(row)).cloned().collect();
-    seen.lines = look.lines(found, &rows, &[Search::Near])?;
-    Ok(())
+) -> Result<Seen, CalibrateError> {
+    let again = match look_near(found, rows, look) {
+        // What a first look showed well is no worse for a second one.
+        Err(CalibrateError::NoHighlight { .. } | CalibrateError::TargetTurned { .. }) => {
+            return Ok(seen);
+        }
+        again => again?,
+    };
+    let is_most = |again: usize, seen: usize| again as f64 >= MOST_AGAIN * seen as f64;
+    let shows_most = is_most(again.lines.len(), seen.lines.len())
+        && is_most(again.shaded.len(), seen.shaded.len());
+    Ok(if shows_most { again } else { seen })
 }
 
 /// What one frame shows.

@@ -37,6 +37,7 @@ pub(crate) use light_off::{LightOff, light_off};
 pub use mirror::MirrorFit;
 pub use numbers::{Number, NumberState, Spread};
 pub use residuals::{LineResidual, Residuals, ShadingResidual};
+use shading::thin_for_a_start;
 pub(crate) use shading::{ReferenceValue, ShadedFrame};
 
 use crate::process::FrameSource;
@@ -48,10 +49,11 @@ use gonia_brdf::Pose;
 use gonia_rig::{Remark, Rig};
 use light::{Known, Light};
 use lines::misfit_px;
-use look::{Seen, find_lines, look_again};
+use look::{Seen, look_again, look_near};
 use mirror::{MirrorFrame, MirrorLight};
 use numbers::{changes, direction_u};
 use record::{direction_u_of_light_as_it_was, record, table};
+use search::first_camera;
 use unknowns::{CAMERA, LIGHT, values, with_values};
 
 /// More than this share of frames that do not fit are another rig's.
@@ -107,14 +109,17 @@ pub fn calibrate(
     }
     let seen = step(progress, Step::FindingLines, |tell| {
         let look = Look::new(rig, source, 2 * rows.len() + search::LOOKS, tell);
-        let mut seen = find_lines(rig, &rows, &look)?;
+        let camera = first_camera(rig, &rows, &look)?;
+        let seen = look_near(&camera, &rows, &look)?;
         // Without shading there is no light to be found; what keeps these frames from a calibration is said when
         // they are concluded from.
+        let mut about = seen.clone();
+        thin_for_a_start(&mut about.shaded);
         if !seen.shaded.is_empty()
-            && let Ok(found) = conclude(rig, rows.len(), seen.clone())
+            && let Ok(found) = conclude(rig, rows.len(), about)
             && found.rig.light != rig.light
         {
-            look_again(&found.rig, &rows, &mut seen, &look)?;
+            return look_again(&found.rig, &rows, seen, &look);
         }
         Ok::<Seen, CalibrateError>(seen)
     })?;

@@ -34,6 +34,10 @@ const LOWEST_COSINE: f64 = 0.05;
 const MOST_POINTS: usize = 120_000;
 /// The same with an unknown reference, whose coefficients cost as much as all other numbers.
 const MOST_POINTS_UNKNOWN: usize = 40_000;
+/// The logarithm of the least irradiance.
+const LN_DARK: f64 = -13.8;
+/// Points that show about where a light is.
+const POINTS_FOR_A_START: usize = 10_000;
 /// The least noise that a value is taken to have, relative.
 const LEAST_NOISE: f64 = 2e-4;
 /// Frames with fewer points than this tell nothing.
@@ -285,6 +289,15 @@ pub fn thin(frames: &mut [ShadedFrame], reference: ReferenceShape) {
         ReferenceShape::Known => MOST_POINTS,
         ReferenceShape::Smooth => MOST_POINTS_UNKNOWN,
     };
+    thin_to(frames, most);
+}
+
+/// Thins frames to what shows about where the light is.
+pub fn thin_for_a_start(frames: &mut [ShadedFrame]) {
+    thin_to(frames, POINTS_FOR_A_START);
+}
+
+fn thin_to(frames: &mut [ShadedFrame], most: usize) {
     let points: usize = frames.iter().map(|frame| frame.points.len()).sum();
     let step = points.div_ceil(most).max(1);
     frames.iter_mut().for_each(|frame| frame.thin(step));
@@ -302,7 +315,7 @@ pub fn ln_intensity(rig: &Rig, frames: &[ShadedFrame]) -> f64 {
 
 /// A point below the light's horizon is as dark as makes no difference.
 fn ln_irradiance(light: &IdealLight, at: [f64; 2]) -> f64 {
-    light.irradiance(at).max(1e-6).natural_log()
+    light.ln_irradiance(at).max(LN_DARK)
 }
 
 impl Frames for Shading<'_> {

@@ -3,7 +3,7 @@
 //! The frame's own numbers (its arms' errors at that moment, a line's own error) are eliminated frame by
 //! frame (Schur complement), so that the normal equations have the size of the shared numbers however
 //! many frames there are. Their standard deviations and the noise's are found from the frames themselves
-//! (expectation maximisation), so that uncertainties are those of the rig at hand. Residuals beyond a
+//! (evidence maximisation), so that uncertainties are those of the rig at hand. Residuals beyond a
 //! few standard deviations lose their weight (Cauchy).
 
 use nalgebra::{DMatrix, DVector};
@@ -90,7 +90,9 @@ impl Solved {
     /// The covariance of the numbers `among`, where the others are known: by how the solution scatters when frames
     /// are left out one by one. What is common to the residuals of a frame, modelled or not, is in it
     /// (the cluster-robust estimate CR3: Bell and McCaffrey 2002). To that comes what the priors' own
-    /// uncertainty leaves. `None` where there is none.
+    /// uncertainty leaves. Where few frames have a say, their scatter is itself a chance: no combination of numbers
+    /// is known better than by the scatter of noise and of frames' own numbers, which all frames tell. `None` where
+    /// there is none.
     pub fn covariance(&self, prior: &[f64], among: &[usize]) -> Option<DMatrix<f64>> {
         let n = among.len();
         let of = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| m[(among[i], among[j])]);
@@ -109,10 +111,20 @@ impl Solved {
             let step = (&all - normal).cholesky()?.solve(&right);
             scatter += &step * step.transpose();
         }
-        let sum = scatter + &inverse * &inverse;
+        let sum = at_least(&(scatter + &inverse * &inverse), &inverse)?;
         let scaled = |i: usize, j: usize| sum[(i, j)] * prior[among[i]] * prior[among[j]];
         Some(DMatrix::from_fn(n, n, scaled))
     }
+}
+
+/// A covariance that is no smaller than another one in any direction, and the first where that is larger.
+fn at_least(covariance: &DMatrix<f64>, least: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let root = least.clone().cholesky()?.l();
+    let half = root.solve_lower_triangular(covariance)?;
+    let whitened = root.solve_lower_triangular(&half.transpose())?;
+    let mut eigen = (0.5 * (&whitened + whitened.transpose())).symmetric_eigen();
+    eigen.eigenvalues.apply(|value| *value = value.max(1.0));
+    Some(&root * eigen.recompose() * root.transpose())
 }
 
 /// The normal equations of one frame, without its own numbers.
@@ -174,11 +186,16 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
         if problem.finds_noise && round >= BEFORE_NOISE {
             let covariance = factor.inverse();
             for (j, sd) in own_sd.iter_mut().enumerate() {
-                let square = |(own, frame): (&Vec<f64>, &Reduced)| {
-                    own[j] * own[j] + frame.own_variance(j, &free, &covariance) * had[j] * had[j]
-                };
-                let mean = own.iter().zip(&reduced).map(square).sum::<f64>() / own.len() as f64;
-                *sd = mean.sqrt().max(problem.least_own[j]);
+                // Of few frames that tell little the mean square of what is found would creep towards its end:
+                // MacKay's fixed point (1992) divides by how much the frames tell.
+                let (mut squares, mut told) = (0.0, 0.0);
+                for (own, frame) in own.iter().zip(&reduced) {
+                    squares += own[j] * own[j];
+                    told += (1.0 - frame.own_variance(j, &free, &covariance)).max(0.0);
+                }
+                let variance = squares / told.max(f64::MIN_POSITIVE);
+                let ratio = (variance / (had[j] * had[j])).clamp(0.25, 4.0);
+                *sd = (ratio.sqrt() * had[j]).max(problem.least_own[j]);
             }
         }
         let steady = own_sd
@@ -339,6 +356,16 @@ mod tests {
             seen.map(|(t, y)| (a + b * t as f64 + own[0] - y) / 0.1)
                 .collect()
         }
+    }
+
+    #[test]
+    fn a_covariance_is_raised_where_it_is_smaller_alone() {
+        let least = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0]);
+        // Along (1, 1) the least has 3, along (1, −1) it has 1.
+        let given = DMatrix::from_row_slice(2, 2, &[3.0, -2.0, -2.0, 3.0]);
+        let raised = at_least(&given, &least).unwrap();
+        let expected = DMatrix::from_row_slice(2, 2, &[4.0, -1.0, -1.0, 4.0]);
+        assert!((raised - expected).amax() < 1e-12);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::groups::{groups, spread_over};
 use crate::Error;
 use crate::budget::{Equation, PLACES, Part, Slant, places, shape};
-use crate::doubts;
+use crate::warnings;
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
 use gonia_brdf::{Direction, Elementary, SymmetryKind};
@@ -31,10 +31,10 @@ impl FitOfSamples {
         symmetry: Option<SymmetryKind>,
     ) -> Result<(Self, Vec<Remark>), Error> {
         let mut samples = samples.into();
-        let mut remarks = doubts::of_oddities(&samples.keep_sound());
+        let mut remarks = warnings::of_oddities(&samples.keep_sound());
         let n = samples.channels().count();
         let spread = samples.three(spread_over(n));
-        remarks.extend(doubts::of_samples(&spread)?);
+        remarks.extend(warnings::of_samples(&spread)?);
         if spread.len() > SAMPLES_AT_MOST {
             return Err(Error::Contradicted {
                 what: format!(
@@ -47,9 +47,9 @@ impl FitOfSamples {
         let too_few = FillError::TooFewBins(spread.len());
         let fit = ScatteredFit::new(&spread, symmetry).ok_or(too_few)?;
         let choice = fit.choice().clone();
-        remarks.extend(doubts::remarks_on_symmetry(&fit));
+        remarks.extend(warnings::remarks_on_symmetry(&fit));
         if choice.reason == Reason::Assumed {
-            remarks.push(doubts::remark_on_assumed_isotropy());
+            remarks.push(warnings::remark_on_assumed_isotropy());
         }
         let mut of_all = groups::<3>(n);
         let groups = if of_all == [spread_over(n)] {

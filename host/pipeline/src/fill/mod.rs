@@ -30,8 +30,8 @@ pub use options::{FillMethod, FillOptions};
 pub use rows::fill_to_file;
 
 use crate::Error;
-use crate::doubts::{self, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
+use crate::warnings::{self, DirectionalAlbedo};
 use gonia_brdf::baselines;
 use gonia_brdf::interpolate::OriginCounts;
 use gonia_formats::dense::ChannelErrors;
@@ -168,7 +168,7 @@ pub fn fill(
     let albedo = DirectionalAlbedo::of_channels(&dense, prepared.highest_deg());
     let cells = prepared.bins.bins().iter().map(|b| b.cell).collect();
     let mut remarks = prepared.remarks;
-    remarks.extend(doubts::remark_on_energy(&albedo, scale));
+    remarks.extend(warnings::remark_on_energy(&albedo, scale));
     let account = FillAccount {
         counts,
         settings,

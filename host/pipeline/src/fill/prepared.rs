@@ -6,16 +6,16 @@ use super::options::FillOptions;
 use super::origins::Origins;
 use super::symmetry::{scattered_fit, symmetry_of_many};
 use crate::Error;
-use crate::doubts::{self, Isotropy};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
+use crate::warnings::{self, Isotropy};
 use gonia_brdf::interpolate::OriginCounts;
 use gonia_brdf::scattered::{FEW_ANISOTROPIC, Reason, ScatteredFit, is_few};
 use gonia_brdf::{Bin, Bins, Grid, Symmetry};
 use gonia_formats::fit_source::{FIT_SYMMETRY, fit_symmetry};
 use gonia_rig::{Remark, SampleValues};
 
-/// Samples in their bins, by three channels that stand for all, and what is to be said of them. Doubts, symmetry
+/// Samples in their bins, by three channels that stand for all, and what is to be said of them. Warnings, symmetry
 /// and, of up to three channels, the values rest on these.
 pub(super) struct Prepared {
     pub bins: Bins,
@@ -43,9 +43,9 @@ impl Prepared {
         progress: &Progress<'_>,
     ) -> Result<Self, Error> {
         let count = all.len();
-        let mut remarks = doubts::of_oddities(&all.keep_sound());
+        let mut remarks = warnings::of_oddities(&all.keep_sound());
         let samples = all.three(spread_over(all.channels().count()));
-        remarks.extend(doubts::of_samples(&samples)?);
+        remarks.extend(warnings::of_samples(&samples)?);
         // About a plane that is known the samples are completed by their images, however few they are.
         let known = options.symmetry_of_plane();
         let fit = match known {
@@ -68,14 +68,14 @@ impl Prepared {
             let choice = fit.choice();
             let is_odd = choice.contradicted_by.is_some() || choice.plane_undetermined;
             if takes_place || is_odd {
-                remarks.extend(doubts::remarks_on_symmetry(fit));
+                remarks.extend(warnings::remarks_on_symmetry(fit));
             }
             takes_place
         });
         let bins = step(progress, Step::Binning, |_| {
             Ok::<_, Error>(Bins::new(grid, &samples))
         })?;
-        remarks.extend(doubts::of_bins(&samples, &bins));
+        remarks.extend(warnings::of_bins(&samples, &bins));
         let isotropy = match (symmetry.is_isotropic(), reason) {
             (false, _) => Isotropy::No,
             (_, Reason::Asked) => Isotropy::Asked,
@@ -89,7 +89,7 @@ impl Prepared {
             bins
         };
         let origins = Origins::of(&bins, fit.as_ref()).counts();
-        remarks.extend(doubts::remark_on_layout(&samples, &origins, isotropy));
+        remarks.extend(warnings::remark_on_layout(&samples, &origins, isotropy));
         Ok(Self {
             bins,
             samples: count,

@@ -8,9 +8,9 @@ use super::planes::bins_of;
 use super::prepared::Prepared;
 use super::symmetry::fit_of_others;
 use crate::Error;
-use crate::doubts::{self, AlbedoRows, DirectionalAlbedo};
 use crate::progress::{Progress, Step, step};
 use crate::provenance::Provenance;
+use crate::warnings::{self, AlbedoRows, DirectionalAlbedo};
 use gonia_brdf::interpolate::{AnyKernel, ByRows, Data, FillSettings, NewBlock};
 use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Grid};
@@ -61,7 +61,7 @@ pub fn fill_to_file(
     }?;
     let counts = prepared.counts();
     let mut remarks = prepared.remarks;
-    remarks.extend(doubts::remark_on_energy(&albedo, scale));
+    remarks.extend(warnings::remark_on_energy(&albedo, scale));
     Ok(FillAccount {
         counts,
         settings,

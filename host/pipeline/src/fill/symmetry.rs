@@ -2,8 +2,8 @@
 
 use super::options::{CELLS_IN_MEMORY, FillMethod, FillOptions};
 use crate::Error;
-use crate::doubts;
 use crate::progress::{Progress, Step, step};
+use crate::warnings;
 use gonia_brdf::scattered::{ScatteredFit, is_few};
 use gonia_brdf::{Bins, Direction, Grid, Sample, Symmetry, SymmetryKind};
 use gonia_rig::Remark;
@@ -54,7 +54,7 @@ pub(super) fn symmetry_of_many(samples: &[Sample], asked: SymmetryKind) -> (Symm
     match ScatteredFit::new(&some, Some(asked)) {
         Some(fit) => (
             fit.choice().settings.symmetry,
-            doubts::remarks_on_symmetry(&fit),
+            warnings::remarks_on_symmetry(&fit),
         ),
         None => (Symmetry::None, Vec::new()),
     }

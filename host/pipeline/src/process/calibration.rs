@@ -100,13 +100,13 @@ impl Calibrator {
     }
 
     /// What speaks against radiance that is proportional to light, and against the light's place.
-    pub fn doubts(&self, rig: &Rig, grid: &SamplingGrid) -> Vec<Remark> {
+    pub fn warnings(&self, rig: &Rig, grid: &SamplingGrid) -> Vec<Remark> {
         let Method::Known(reference) = &self.method else {
             return Vec::new();
         };
         let frames = self.references.frames();
-        let linearity = linearity::doubt(rig, frames, reference, grid.centre());
-        let light = light_check::doubt(rig, frames, reference, grid.points_mm());
+        let linearity = linearity::warning(rig, frames, reference, grid.centre());
+        let light = light_check::warning(rig, frames, reference, grid.points_mm());
         linearity.into_iter().chain(light).collect()
     }
 

@@ -76,7 +76,7 @@ struct Row {
 }
 
 /// What speaks against the light's place. `points_mm` is the rig's grid.
-pub fn doubt(
+pub fn warning(
     rig: &Rig,
     frames: &[ReferenceFrame],
     reference: &KnownReference,

@@ -19,7 +19,7 @@ const LEAST_OFFSET: f64 = 0.03;
 const LEAST_EXPLAINED: f64 = 0.9;
 
 /// What speaks against radiance that is proportional to light. `centre` is the grid's middle point.
-pub fn doubt(
+pub fn warning(
     rig: &Rig,
     frames: &[ReferenceFrame],
     reference: &KnownReference,

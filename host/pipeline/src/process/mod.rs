@@ -290,8 +290,8 @@ pub fn process_sampled(
         },
     )?;
     rig_check::check_orientation(&frames, Role::Material)?;
-    let mut remarks = rig_check::doubts(rig, rows, &frames);
-    remarks.extend(calibrator.doubts(rig, &bench.grid));
+    let mut remarks = rig_check::warnings(rig, rows, &frames);
+    remarks.extend(calibrator.warnings(rig, &bench.grid));
     Ok(Processed {
         offsets: OffsetStatistics::of(&frames),
         samples,

@@ -203,7 +203,7 @@ pub fn check_orientation(frames: &[FrameReport], role: Role) -> Result<(), Proce
 }
 
 /// What speaks against the rig in what became of its frames.
-pub fn doubts(rig: &Rig, rows: &[FrameRow], frames: &[FrameReport]) -> Vec<Remark> {
+pub fn warnings(rig: &Rig, rows: &[FrameRow], frames: &[FrameReport]) -> Vec<Remark> {
     let alike = refused_alike(rig, frames).map(|alike| alike.remark());
     let mut remarks: Vec<Remark> = alike.into_iter().collect();
     remarks.extend(by_pose(frames));

@@ -209,6 +209,21 @@ class Dense:
         """Writes OpenEXR, and the error bars under a second name."""
         self._of.save(os.fspath(path), None if error is None else os.fspath(error))
 
+    def export(
+        self,
+        path: Path,
+        format: str | None = None,
+        resolution: int | None = None,
+        assume_scale: float | None = None,
+    ) -> dict[str, Any]:
+        """Writes another program's format, by the ending or by name (``gonia export --list-formats``).
+
+        A dict: how far the file, read back, is from the values (``median``, ``p99``, ``rms`` of abs(ln)).
+        """
+        found = _gonia.export(self._of, os.fspath(path), format, resolution, assume_scale)
+        _warn(found["remarks"])
+        return found
+
     def to_xarray(self) -> xarray.Dataset:
         """An xarray.Dataset with named dimensions, units, uncertainty and provenance (copies the values)."""
         import xarray

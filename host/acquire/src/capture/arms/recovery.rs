@@ -44,6 +44,8 @@ impl HomeError {
                     | FaultCode::HOST_WATCHDOG
                     | FaultCode::STEP_LOSS
                     | FaultCode::HOME_MISMATCH
+                    | FaultCode::EDGE_LOST
+                    | FaultCode::INDEX_WRONG
             ),
             HomeError::Link(LinkError::Refused { refusal, .. }) => matches!(
                 refusal,

@@ -1,4 +1,4 @@
-//! Doubts about values: at or below zero.
+//! Warnings about values: at or below zero.
 
 use super::SAMPLES;
 use crate::Error;

@@ -1,4 +1,4 @@
-//! A doubt about where polar angles are measured from: the surface, in place of the normal.
+//! A warning about where polar angles are measured from: the surface, in place of the normal.
 //!
 //! Values are smooth over the right directions, and a highlight depends on little but the half vector. With
 //! the angles' complements what is one direction, the pole, is torn into a ring, and a ring is drawn together. So

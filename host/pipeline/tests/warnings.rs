@@ -113,6 +113,27 @@ fn sound_samples_draw_no_remark() {
 }
 
 #[test]
+fn a_peak_that_is_narrower_than_pairs_are_apart_is_no_cosine() {
+    // Across a retro-reflection of a third of a degree, in steps of a tenth.
+    let light = Direction::from_deg(30.0, 0.0);
+    let across = (100..500).map(|k| 0.1 * f64::from(k)).map(|theta| {
+        let value = 0.1 + 2.0 * (-0.5 * ((theta - 30.27) / 0.34).powi(2)).exponential();
+        Sample::new(light, Direction::from_deg(theta, 0.0), [value as f32; 3])
+    });
+    let options = FillOptions::with_step_deg(6.0);
+    let filled = fill(
+        across.collect::<Vec<_>>(),
+        Scale::Relative,
+        &options,
+        &silent,
+    )
+    .unwrap();
+    let said = filled.account.remarks.iter().map(ToString::to_string);
+    let of_a_cosine: Vec<String> = said.filter(|s| s.contains("cosines")).collect();
+    assert!(of_a_cosine.is_empty(), "{of_a_cosine:?}");
+}
+
+#[test]
 fn a_cosine_in_the_values_is_seen_in_reciprocal_pairs_and_a_symmetric_one_is_not() {
     let mut missed = Vec::new();
     for name in Material::NAMES {

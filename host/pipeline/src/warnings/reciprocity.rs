@@ -1,4 +1,4 @@
-//! Doubts about a cosine: values that are not reciprocal, but would be without a factor.
+//! Warnings about a cosine: values that are not reciprocal, but would be without a factor.
 //!
 //! A BRDF has the same value with light and view exchanged. Of f·cosᵖθv·cosᵠθi the logarithms of two such
 //! values differ by (p − q)·(ln cos θv − ln cos θi): a line through the origin, whose slope is p − q. What
@@ -30,8 +30,11 @@ const LEVER_MIN: f64 = 0.05;
 const SLOPE_MIN: f64 = 0.5;
 /// … by so many standard errors …
 const SURE: f64 = 5.0;
-/// … and leaves less than this share of the pairs' disagreement.
+/// … leaves less than this share of the pairs' disagreement …
 const LEFT_MAX: f64 = 0.75;
+/// … and is no steeper than a squared cosine, which nobody exceeds by mistake: a peak that is narrower than the
+/// pairs are apart makes any slope.
+const SLOPE_MAX: f64 = 2.5;
 
 /// The logarithms of two values, and of the cosines, as differences: (ln cosθv/cosθi, ln f).
 type Pair = (f64, f64);
@@ -195,7 +198,8 @@ fn slope(pairs: &[Pair]) -> Option<Slope> {
     }
     let (mut before, mut after) = (residuals(pairs, 0.0), residuals(pairs, value));
     let explained = f64::from(median(&mut after)) < LEFT_MAX * f64::from(median(&mut before));
-    (explained && value.abs() - SURE * error > SLOPE_MIN).then_some(Slope { value, error })
+    let is_cosine = value.abs() - SURE * error > SLOPE_MIN && value.abs() < SLOPE_MAX;
+    (explained && is_cosine).then_some(Slope { value, error })
 }
 
 fn residuals(pairs: &[Pair], slope: f64) -> Vec<f32> {

@@ -2,7 +2,7 @@
 //! the normal, against values of a BRDF, against a signal above the noise, and against directions all
 //! over two hemispheres.
 //!
-//! Every doubt has its evidence in the samples themselves; what they cannot tell is not doubted. Sound samples
+//! Every warning has its evidence in the samples themselves; of what they cannot tell there is none. Sound samples
 //! draw no remark.
 
 mod angles;

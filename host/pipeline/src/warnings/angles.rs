@@ -1,4 +1,4 @@
-//! Doubts about the unit of angles: radians for degrees.
+//! Warnings about the unit of angles: radians for degrees.
 
 use super::{SAMPLES, some};
 use crate::Error;
