@@ -14,6 +14,7 @@ mod length;
 mod links;
 mod load;
 mod modules;
+mod python;
 mod readers;
 mod size;
 mod steps;
@@ -36,6 +37,7 @@ cargo xtask size     flash and RAM of every board against its budget
 cargo xtask systems  lint everything for Windows and macOS (the tests do so for Windows)
 cargo xtask fuzz     let the fuzzer loose on the protocol for a minute a target
 cargo xtask windows  run the demo under Wine: the same bytes as on Linux
+cargo xtask python   the Python package, built and tested (Python's own packages from PyPI)
 cargo xtask readers  what gonia exports, read by other programs (from PyPI)
 cargo xtask wiring   the tables and figures of the wiring pages, from the boards' pins
 cargo xtask book     check the links of all pages and build the book in docs/book
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         "systems" => steps::systems(),
         "fuzz" => steps::fuzz(),
         "windows" => windows::compare_with_linux(),
+        "python" => python::check(),
         "readers" => readers::check(),
         "wiring" => tools::root().and_then(|root| wiring::write(&root)),
         "book" => book::book(),
