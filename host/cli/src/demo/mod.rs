@@ -144,8 +144,11 @@ struct FilledDemo {
     /// The standard errors, where they were computed …
     bars: Option<ErrorBars>,
     /// … and how often they are true, for the table.
-    coverage: Option<(String, String)>,
+    coverage: Option<Row>,
 }
+
+/// A row of the table at the demo's end: a name, and what is said of it.
+type Row = (String, String);
 
 /// A demo under way.
 struct Run {
@@ -304,7 +307,7 @@ impl Run {
         dense: &DenseFile,
         errors: ChannelErrors,
         budget: &Budget,
-    ) -> Result<(Option<ErrorBars>, Option<(String, String)>)> {
+    ) -> Result<(Option<ErrorBars>, Option<Row>)> {
         const GREEN: usize = 1;
         let (grid, planes) = (dense.brdf.grid(), dense.brdf.planes());
         let truth = self.material.brdf.as_ref();
