@@ -13,12 +13,21 @@ def direction(theta, phi):
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
+def lobe(v):
+    """Asymmetric in every way."""
+    return 1 + 0.4 * v[0] + 0.3 * v[1] + 0.3 * v[0] * v[1]
+
+
 def brdf(light, view):
     """1/sr, green, for 3 x N directions: reciprocal, and asymmetric in every way."""
-    lobe = lambda v: 1 + 0.4 * v[0] + 0.3 * v[1] + 0.3 * v[0] * v[1]
     half = light + view
     half /= np.linalg.norm(half, axis=0)
     return 0.1 * lobe(light) * lobe(view) + np.exp(-30 * (1 - half[2]))
+
+
+def smooth(light, view):
+    """The same without its highlight: for files and readers that know patches of ten degrees and more."""
+    return 0.1 * lobe(light) * lobe(view)
 
 
 def table(path, scales=None, function=brdf, step=STEP):
@@ -66,14 +75,14 @@ CONFUSED = {
 }
 
 
-def check(name, found, light, view, limits, factor=1.0):
-    """Prints how far values are, and whether they are within limits and nearer than any confused BRDF."""
-    median, p99 = ln(found, factor * brdf(light, view))
+def check(name, found, light, view, limits, factor=1.0, function=brdf, apart=2.0):
+    """Prints how far values are, and whether they are within limits and `apart` times nearer than any confused BRDF."""
+    median, p99 = ln(found, factor * function(light, view))
     print(f"{name}: |ln| median {median:.4f}, p99 {p99:.4f}")
     good = median < limits[0] and p99 < limits[1]
     for what, confuse in CONFUSED.items():
-        wrong, _ = ln(found, factor * brdf(*confuse(light, view)))
-        if wrong < 2 * median:
+        wrong, _ = ln(found, factor * function(*confuse(light, view)))
+        if wrong < apart * median:
             print(f"{name}: as near to what is {what}: {wrong:.4f}")
             good = False
     return good

@@ -15,7 +15,7 @@ import numpy as np
 import pyradiance
 from pyradiance import bsdf
 
-from lopsided import brdf, check, direction, export, ln, pairs, table
+from lopsided import brdf, check, export, ln, pairs, smooth, table
 
 N = 3000
 KEPT = []
@@ -44,7 +44,7 @@ def isotropic(light, view):
 
 def through_pabopto(gonia, folder, light, view):
     """Values of a few incidences as pabopto2bsdf's radial functions have them: a check of orientation."""
-    table(f"{folder}/coarse.exr", {"Y": 1}, step=10.0)
+    table(f"{folder}/coarse.exr", {"Y": 1}, smooth, step=10.0)
     export(gonia, f"{folder}/coarse.exr", f"{folder}/a.pab", "--resolution", "4")
     root = os.path.dirname(pyradiance.__file__)
     env = os.environ | {"PATH": f"{root}/bin{os.pathsep}{os.environ['PATH']}", "RAYPATH": f"{root}/lib"}
@@ -61,15 +61,17 @@ def main():
     good = True
     with tempfile.TemporaryDirectory() as folder:
         at = lambda name: os.path.join(folder, name)
-        table(at("dense.exr"), {"R": 1, "G": 0.5, "B": 0.25})
-        table(at("one.exr"), {"Y": 1})
         # Y of linear sRGB.
         luminance = 0.2126 + 0.5 * 0.7152 + 0.25 * 0.0722
-        for name, limits in [("tensortree4", (0.06, 0.5)), ("klems", (0.1, 0.9))]:
+        for name, function, limits in [("tensortree4", brdf, (0.06, 0.5)), ("klems", smooth, (0.06, 0.5))]:
+            table(at("dense.exr"), {"R": 1, "G": 0.5, "B": 0.25}, function)
+            table(at("one.exr"), {"Y": 1}, function)
             for source, factor in [("one.exr", 1.0), ("dense.exr", luminance)]:
-                export(gonia, at(source), at("a.xml"), "--format", name)
-                found = values(at("a.xml"), light, view)
-                good &= check(f"{name} of {source}", found[:, 1], light, view, limits, factor)
+                # A name of its own: what was loaded under a name before is not read again.
+                written = at(f"{name}-{source}.xml")
+                export(gonia, at(source), written, "--format", name)
+                found = values(written, light, view)
+                good &= check(f"{name} of {source}", found[:, 1], light, view, limits, factor, function)
             # X / Y and Z / Y of the colour, over the white point's.
             x, z = 0.4124 + 0.5 * 0.3576 + 0.25 * 0.1805, 0.0193 + 0.5 * 0.1192 + 0.25 * 0.9505
             wanted = np.array([x / 0.9505, z / 1.0890]) / luminance
@@ -77,13 +79,15 @@ def main():
             print(f"{name}: X/Y, Z/Y {colour}, wanted {wanted}")
             good &= bool(np.all(np.abs(np.log(colour / wanted)) < 0.05))
         table(at("isotropic.exr"), {"Y": 1}, isotropic)
-        export(gonia, at("isotropic.exr"), at("a.xml"), "--format", "tensortree3")
-        found = values(at("a.xml"), light, view)[:, 1]
+        export(gonia, at("isotropic.exr"), at("tensortree3.xml"), "--format", "tensortree3")
+        found = values(at("tensortree3.xml"), light, view)[:, 1]
         median, p99 = ln(found, isotropic(light, view))
         mirrored, _ = ln(found, isotropic(light * [[1], [-1], [1]], view * [[1], [-1], [1]]))
         print(f"tensortree3: |ln| median {median:.4f}, p99 {p99:.4f}; mirrored {mirrored:.4f}")
         good &= bool(median < 0.04 and p99 < 0.2 and mirrored > 2 * median)
-        good &= check("pab by pabopto2bsdf", through_pabopto(gonia, folder, light, view), light, view, (0.2, 2.0))
+        # Its radial functions are themselves a tenth off.
+        found = through_pabopto(gonia, folder, light, view)
+        good &= check("pab by pabopto2bsdf", found, light, view, (0.2, 2.0), function=smooth, apart=1.2)
     sys.stdout.flush()
     os._exit(0 if good else 1)
 

@@ -503,6 +503,7 @@ fn a_fault_and_a_cable_that_was_out_are_recovered_automatically() {
     };
     let plan = FaultPlan {
         events: vec![
+            at(middle_us / 2, Fault::EncoderWarns { axis: Axis::Phi }),
             at(middle_us, lost),
             at(
                 middle_us + 20_000_000,
@@ -515,6 +516,11 @@ fn a_fault_and_a_cable_that_was_out_are_recovered_automatically() {
     assert_eq!(ended.end, SessionEnd::Finished, "{}", ended.reason);
     assert!(ended.arms.recoveries > 0);
     assert_eq!(crcs(folder.path()), crcs(calm.path()));
+    let journal = std::fs::read_to_string(folder.path().join("journal.log")).unwrap();
+    let warned = "warning: camera arm, φ: encoder warns that it is near its limits (code 23); clean the ring";
+    assert!(journal.contains(warned), "{journal}");
+    let journal = std::fs::read_to_string(calm.path().join("journal.log")).unwrap();
+    assert!(!journal.contains("warning"), "{journal}");
 }
 
 #[test]
