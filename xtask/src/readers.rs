@@ -1,8 +1,8 @@
 //! Other people's programs read what `gonia export` writes: they come from PyPI into a folder of their own.
 
-use crate::tools::{apt_get, cargo, install, root, run};
-use anyhow::{Context, Result, bail};
-use std::path::{Path, PathBuf};
+use crate::tools::{apt_get, cargo, python_with, root, run};
+use anyhow::{Context, Result};
+use std::path::PathBuf;
 use std::process::Command;
 
 /// What the scripts in `tests/readers` import, at the versions that they were tried with.
@@ -21,12 +21,9 @@ const SCRIPTS: [&str; 3] = ["mitsuba_bsdf.py", "radiance_xml.py", "arrays.py"];
 
 /// Has every reader read what gonia exports, and fails where one reads something else.
 pub fn check() -> Result<()> {
-    if !install("python3", "python3-venv") {
-        bail!("python3 is missing: apt-get install python3-venv");
-    }
     let root = root()?;
     run(cargo(&root).args(["build", "--package", "gonia"]))?;
-    let python = environment(&root.join("target/readers"))?;
+    let python = python_with(&root.join("target/readers"), &PACKAGES)?;
     // Mitsuba compiles for many values at a time by LLVM.
     let llvm = llvm().context("libLLVM is missing: apt-get install libllvm19")?;
     for script in SCRIPTS {
@@ -37,17 +34,6 @@ pub fn check() -> Result<()> {
             .env("DRJIT_LIBLLVM_PATH", &llvm))?;
     }
     Ok(())
-}
-
-/// Python with the packages, made where it is not yet.
-fn environment(folder: &Path) -> Result<PathBuf> {
-    let python = folder.join("bin/python");
-    if !python.exists() {
-        run(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
-    }
-    let pip = ["-m", "pip", "install", "--quiet"];
-    run(Command::new(&python).args(pip).args(PACKAGES))?;
-    Ok(python)
 }
 
 /// LLVM's library, the newest that is there.

@@ -96,3 +96,17 @@ pub fn run(command: &mut Command) -> Result<()> {
     }
     Ok(())
 }
+
+/// A Python of its own in a folder, with packages from PyPI (`name==version`); made where it is not yet.
+pub fn python_with(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
+    if !install("python3", "python3-venv") {
+        bail!("python3 is missing: apt-get install python3-venv");
+    }
+    let python = folder.join("bin/python");
+    if !python.exists() {
+        run(Command::new("python3").args(["-m", "venv"]).arg(folder))?;
+    }
+    let pip = ["-m", "pip", "install", "--quiet"];
+    run(Command::new(&python).args(pip).args(packages))?;
+    Ok(python)
+}
