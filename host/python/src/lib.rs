@@ -16,7 +16,7 @@ mod samples;
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
-    _gonia,
+    gonia,
     GoniaError,
     pyo3::exceptions::PyException,
     "What is wrong, where, what was found and what to do, in one line."
