@@ -1,4 +1,4 @@
-//! Numbers from and to numpy, by the buffer protocol and by the array interface: no copy where none is asked for.
+//! Numbers from and to numpy, by the buffer protocol (copied) and by the array interface (not copied).
 
 use crate::to_py;
 use pyo3::buffer::PyBuffer;
@@ -38,7 +38,7 @@ impl Values {
     }
 }
 
-/// What numpy is told of float32 values that stay where they are: read-only.
+/// The array interface of float32 values that stay where they are: read-only.
 pub fn interface<'py>(
     py: Python<'py>,
     values: &[f32],

@@ -112,7 +112,7 @@ pub type WriteTable = fn(&Path, &DenseChannels, Option<&DenseChannels>) -> Resul
 
 /// A number that the size of a file, and with it its error, is chosen by.
 pub struct Resolution {
-    /// Where nothing else is asked for.
+    /// The usual one.
     pub default: usize,
     /// The least that makes sense.
     pub least: usize,
