@@ -13,12 +13,15 @@
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
 //! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
 //! | [`checksum`] | what ties a note to the file that it was written of |
+//! | [`material`] | fitted models as materials of other programs |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
 //!
 //! A new format of dense BRDFs, of samples or of another group is one file that defines a `Format`
 //! (`dense_exr.rs` and `utia.rs` are examples), and one row in `table.rs`.
 
+mod alta;
+mod astm;
 pub mod baselines_toml;
 mod capture_folder;
 pub mod cell_mask;
@@ -47,6 +50,7 @@ pub mod frame_exr;
 pub mod frames_csv;
 mod lossless_jpeg;
 pub mod masks_csv;
+pub mod material;
 mod merl;
 mod named_table;
 mod ngan;
