@@ -234,7 +234,11 @@ fn artists_models_find_a_table_of_themselves() {
         assert!(found.residual_rms < 2e-3, "{}: {found:?}", case.name);
         for (k, p) in case.family.parameters().iter().enumerate() {
             let off = (found.values[k] - case.truth[k]).abs();
-            let off = if p.range == Range::Azimuth { off / 90.0 } else { off };
+            let off = if p.range == Range::Azimuth {
+                off / 90.0
+            } else {
+                off
+            };
             assert!(off < 0.03, "{}: {} {found:?}", case.name, p.name);
         }
     }

@@ -167,7 +167,9 @@ impl Fit {
             if is_material_name(output) {
                 check_material(output, &self.model.to_string())?;
             } else {
-                if check_dense_name(output).is_err() {
+                let ending = output.extension();
+                let is_table = ending.is_none_or(|e| e.eq_ignore_ascii_case("exr"));
+                if !is_table || check_dense_name(output).is_err() {
                     return Err(FileError::new(
                         output,
                         "has not the ending of a fit",

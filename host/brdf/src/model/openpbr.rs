@@ -97,17 +97,20 @@ impl OpenPbr {
     /// The model as published, whose layers are scaled by the viewer's side.
     fn published(&self, light: Vec3, view: Vec3, lobes: &Lobes) -> [f64; 3] {
         let cos_v = view[2].clamp(1e-6, 1.0);
-        let (specular, below) = layer(lobes.cos_d, cos_v, lobes.base_alpha, lobes.base_index);
-        let (coat, below_coat) = layer(lobes.cos_d, cos_v, lobes.coat_alpha, COAT_INDEX);
+        let base_albedo = ggx_albedo(cos_v, lobes.base_alpha);
+        let (specular, below) = layer(lobes.cos_d, base_albedo, lobes.base_index);
+        let coat_albedo = ggx_albedo(cos_v, lobes.coat_alpha);
+        let (coat, below_coat) = layer(lobes.cos_d, coat_albedo, COAT_INDEX);
         let coat_f0 = normal_reflectance(COAT_INDEX);
         let inside = 1.0 - (1.0 - coat_f0) / (COAT_INDEX * COAT_INDEX);
         let (fuzz, fuzz_albedo) = fuzz(light, view, self.fuzz_roughness.max(0.01));
         let retro = dot(light, view) - light[2] * view[2];
+        let fujii = self.fujii(light[2], cos_v, retro);
         [0, 1, 2].map(|c| {
             let colour = self.base_color[c];
-            let diffuse = self.diffuse(colour, light[2], cos_v, retro);
+            let diffuse = fujii.of(colour);
             let dielectric = specular * lobes.base + below * diffuse;
-            let many = multiple(cos_v, lobes.base_alpha, mean_schlick(colour));
+            let many = multiple(base_albedo, mean_schlick(colour));
             let metal = schlick(colour, lobes.cos_d) * lobes.base * many;
             let base = dielectric + self.base_metalness * (metal - dielectric);
             let darker = (1.0 - inside) / (1.0 - colour * inside);
@@ -119,8 +122,9 @@ impl OpenPbr {
         })
     }
 
-    /// The energy-preserving Oren–Nayar base; `retro` is the cosine between the directions minus that of their mean plane.
-    fn diffuse(&self, colour: f64, cos_i: f64, cos_v: f64, retro: f64) -> f64 {
+    /// What is the same in all channels of the energy-preserving Oren–Nayar base; `retro` is the cosine between the
+    /// directions less the product of theirs with the normal.
+    fn fujii(&self, cos_i: f64, cos_v: f64, retro: f64) -> Fujii {
         let r = self.base_diffuse_roughness;
         let over = if retro > 0.0 {
             retro / cos_i.max(cos_v).max(1e-6)
@@ -128,20 +132,36 @@ impl OpenPbr {
             retro
         };
         let a = 1.0 / (1.0 + FUJII[0] * r);
-        let single = colour * a * (1.0 + r * over);
         let mean = a * (1.0 + FUJII[1] * r);
         let lost = |cos: f64| (1.0 - fujii_albedo(cos.clamp(1e-6, 1.0), r, a)).max(1e-9);
-        let again = colour * colour * mean / (1.0 - colour * (1.0 - mean).max(0.0));
-        let many = again * lost(cos_i) * lost(cos_v) / (1.0 - mean).max(1e-9);
-        (single + many) / PI
+        Fujii {
+            single: a * (1.0 + r * over),
+            many: lost(cos_i) * lost(cos_v) / (1.0 - mean).max(1e-9),
+            mean,
+        }
     }
 }
 
-/// A dielectric lobe's Fresnel factor with its multiple scattering, and the share that goes through it to what is below.
-fn layer(cos_d: f64, cos_v: f64, alpha: f64, index: f64) -> (f64, f64) {
+/// The base of a white surface: scattered once, more than once, and the mean albedo of the first.
+struct Fujii {
+    single: f64,
+    many: f64,
+    mean: f64,
+}
+
+impl Fujii {
+    /// The base of a colour.
+    fn of(&self, colour: f64) -> f64 {
+        let again = colour * colour * self.mean / (1.0 - colour * (1.0 - self.mean).max(0.0));
+        (colour * self.single + again * self.many) / PI
+    }
+}
+
+/// A dielectric lobe's Fresnel factor with its multiple scattering, and the share that goes through it to what is below;
+/// of the lobe's albedo as [`ggx_albedo`] has it.
+fn layer(cos_d: f64, [a, b]: [f64; 2], index: f64) -> (f64, f64) {
     let f0 = normal_reflectance(index);
-    let many = multiple(cos_v, alpha, mean_schlick(f0));
-    let [a, b] = ggx_albedo(cos_v, alpha);
+    let many = multiple([a, b], mean_schlick(f0));
     let through = 1.0 - (f0 * a + b) * many;
     (dielectric(cos_d, index) * many, through.max(0.0))
 }
@@ -156,8 +176,7 @@ fn mean_schlick(f0: f64) -> f64 {
 }
 
 /// Turquin's factor for light that is scattered more than once among the facets.
-fn multiple(cos: f64, alpha: f64, mean_fresnel: f64) -> f64 {
-    let [a, b] = ggx_albedo(cos, alpha);
+fn multiple([a, b]: [f64; 2], mean_fresnel: f64) -> f64 {
     let single = (a + b).clamp(1e-3, 1.0);
     1.0 + mean_fresnel * (1.0 - single) / single
 }
@@ -272,7 +291,7 @@ mod tests {
                     let phi = p as f64 / n as f64 * TAU;
                     let view = crate::direction::Direction { theta, phi }.to_vec3();
                     let retro = dot(light, view) - light[2] * view[2];
-                    let f = model.diffuse(1.0, light[2], view[2], retro);
+                    let f = model.fujii(light[2], view[2], retro).of(1.0);
                     sum += f * view[2] * theta.sine() * PI / 2.0 * TAU / (n * n) as f64;
                 }
             }
