@@ -302,10 +302,10 @@ impl Brdf for Scaled {
 fn lobe_parameters(k: usize) -> Vec<Parameter> {
     let n = |name: &str| format!("{name}{k}");
     let mut list = amplitude(&n("specular"), 1e3, (0.3, 10.0)).to_vec();
-    list.push(Parameter::share(&n("f0"), (0.02, 0.5)));
+    list.push(Parameter::share(n("f0"), (0.02, 0.5)));
     list.extend(roughness(&n("mx"), &n("my")));
-    list.push(Parameter::share(&n("alpha"), (0.1, 0.6)));
-    list.push(Parameter::azimuth(&n("azimuth")));
+    list.push(Parameter::share(n("alpha"), (0.1, 0.6)));
+    list.push(Parameter::azimuth(n("azimuth")));
     list
 }
 
@@ -320,10 +320,10 @@ fn thread_parameters(k: usize) -> Vec<Parameter> {
     let mut list = albedo.map(|p| p.starting((0.02, 0.4))).to_vec();
     list.extend([
         number("index", Range::Linear(1.1, 2.2), (1.3, 1.6)),
-        Parameter::share(&n("isotropic"), (0.1, 0.5)),
+        Parameter::share(n("isotropic"), (0.1, 0.5)),
         degrees("surface_width", Range::Logarithmic(1.0, 90.0), (3.0, 25.0)),
         degrees("volume_width", Range::Logarithmic(2.0, 120.0), (6.0, 50.0)),
-        Parameter::azimuth(&n("azimuth")),
+        Parameter::azimuth(n("azimuth")),
         degrees("tilt", Range::Linear(0.0, 60.0), (3.0, 40.0)),
     ]);
     list

@@ -293,11 +293,11 @@ fn read(path: &Path) -> Result<Vec<Point>, FileError> {
     Ok((0..values).map(point).collect())
 }
 
+/// Reads the numbers of an array by its name and value.
+type ReadList<'a> = dyn Fn(&str, &Value) -> Result<Vec<f64>, FileError> + 'a;
+
 /// The number of each value's channel or band; none where there is one value a pair.
-fn channels(
-    data: &Value,
-    list: &dyn Fn(&str, &Value) -> Result<Vec<f64>, FileError>,
-) -> Result<Vec<usize>, FileError> {
+fn channels(data: &Value, list: &ReadList<'_>) -> Result<Vec<usize>, FileError> {
     let colours = &data["adhoc_variables"]["channel"];
     if !colours.is_null() {
         let numbers = list("adhoc_variables.channel", colours)?;
