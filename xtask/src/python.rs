@@ -2,6 +2,7 @@
 
 use crate::tools::{cargo, python_with, root, run};
 use anyhow::Result;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What builds and tests it, at the versions that it was tried with.
@@ -20,11 +21,20 @@ const PACKAGES: [&str; 8] = [
 pub fn check() -> Result<()> {
     let root = root()?;
     run(cargo(&root).args(["build", "--package", "gonia"]))?;
+    check_with(&root, &python(&root)?)
+}
+
+/// A Python that has what it needs.
+pub fn python(root: &Path) -> Result<PathBuf> {
+    python_with(&root.join("target/python"), &PACKAGES)
+}
+
+/// As [`check`], of a command that is built, with such a Python.
+pub fn check_with(root: &Path, python: &Path) -> Result<()> {
     let folder = root.join("target/python");
-    let python = python_with(&folder, &PACKAGES)?;
     let package = root.join("host/python");
     run(Command::new(folder.join("bin/maturin"))
-        .args(["develop", "--profile", "dev", "--manifest-path"])
+        .args(["develop", "--quiet", "--profile", "dev", "--manifest-path"])
         .arg(package.join("Cargo.toml"))
         .env("VIRTUAL_ENV", &folder)
         .env("CARGO_TARGET_DIR", root.join("target")))?;

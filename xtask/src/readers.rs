@@ -2,7 +2,7 @@
 
 use crate::tools::{apt_get, cargo, python_with, root, run};
 use anyhow::{Context, Result};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What the scripts in `tests/readers` import, at the versions that they were tried with.
@@ -31,12 +31,21 @@ const SCRIPTS: [&str; 5] = [
 pub fn check() -> Result<()> {
     let root = root()?;
     run(cargo(&root).args(["build", "--package", "gonia"]))?;
-    let python = python_with(&root.join("target/readers"), &PACKAGES)?;
+    check_with(&root, &python(&root)?)
+}
+
+/// A Python that has the readers.
+pub fn python(root: &Path) -> Result<PathBuf> {
+    python_with(&root.join("target/readers"), &PACKAGES)
+}
+
+/// As [`check`], of a command that is built, with such a Python.
+pub fn check_with(root: &Path, python: &Path) -> Result<()> {
     // Mitsuba compiles for many values at a time by LLVM.
     let llvm = llvm().context("libLLVM is missing: apt-get install libllvm19")?;
     for script in SCRIPTS {
         println!("== {script}");
-        run(Command::new(&python)
+        run(Command::new(python)
             .arg(root.join("tests/readers").join(script))
             .arg(root.join("target/debug/gonia"))
             .env("DRJIT_LIBLLVM_PATH", &llvm))?;

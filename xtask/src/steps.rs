@@ -3,10 +3,11 @@
 use crate::table::Table;
 use crate::tools::{cargo, install, install_library, root, run};
 use crate::{
-    boards, book, doors, figures, fuzz, image, images, imports, length, links, systems, wiring,
+    boards, book, doors, figures, fuzz, image, images, imports, length, links, python, readers,
+    systems, wiring,
 };
 use anyhow::{Result, bail};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What the feature `genicam` is built with.
@@ -176,7 +177,32 @@ fn run_others(table: &mut Table, root: &Path, features: &[&str]) -> Result<()> {
         let why = "chromium is missing: apt-get install chromium";
         table.not_run("report and live page in a browser", why);
     }
+    run_in_python(table, root)?;
     run_fuzzers(table, root, FUZZ_BRIEFLY_S)
+}
+
+/// The Python package, and other programs that read what gonia exports: where their packages can be had.
+fn run_in_python(table: &mut Table, root: &Path) -> Result<()> {
+    type Check = fn(&Path, &Path) -> Result<()>;
+    let checks: [(&str, Result<PathBuf>, Check); 2] = [
+        (
+            "the Python package",
+            python::python(root),
+            python::check_with,
+        ),
+        (
+            "exports, read by others",
+            readers::python(root),
+            readers::check_with,
+        ),
+    ];
+    for (name, python, check) in checks {
+        match python {
+            Ok(python) => table.step(name, || check(root, &python))?,
+            Err(error) => table.not_run(name, &format!("{error:#}")),
+        }
+    }
+    Ok(())
 }
 
 /// Seconds that the fuzzer has for a target by itself, and among all tests.
