@@ -45,7 +45,7 @@ const SAME_DEG: f64 = 1.0;
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 const Z95: f64 = 1.96;
 /// The factor of standard errors where nothing was tested: rather wide.
-const UNTESTED_FACTOR: f64 = 2.0;
+const UNTESTED_FACTOR: f64 = 3.0;
 /// Tested factors lie between these: a system takes its kernel and its nugget for known, which are of the same data, so
 /// that its own errors are too small even where tests are nearly all noise.
 const FACTORS: (f64, f64) = (1.2, 20.0);
