@@ -116,7 +116,7 @@ fn few_samples() {
         "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | within 95 % bars |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    for name in ["satin-paint", "fabric", "shot-silk"] {
+    for name in ["satin-paint", "fabric"] {
         let material = material(name);
         for samples in FEW {
             few_row(name, &*material, samples);
