@@ -57,6 +57,28 @@ def ask(gonia, source, rows, *options):
     return np.array(values), " ".join(symmetry)
 
 
+def off(predicted, true):
+    """RMS, median and 95th percentile of |ln(predicted / true)|, as columns."""
+    off = np.abs(np.log(np.maximum(predicted, 1e-9) / true))
+    figures = [np.sqrt(np.mean(off**2)), np.median(off), np.quantile(off, 0.95)]
+    return " | ".join(f"{x:.4f}" for x in figures)
+
+
+def filled(gonia, samples, dense, step):
+    """Fills samples into a dense file, and returns its name."""
+    fill = [gonia, "fill", samples, "-o", dense, "--step", step]
+    subprocess.run(fill, check=True, capture_output=True)
+    return dense
+
+
+def scipy_logs(known, rows, asked):
+    """scipy's fit of the rows' values at known places, at those that are asked."""
+    rbf = RBFInterpolator(
+        known, np.log(rows[:, 4]), neighbors=min(200, len(rows)), kernel="linear", smoothing=1e-3
+    )
+    return np.exp(rbf(asked))
+
+
 def main():
     gonia, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     step = sys.argv[3] if len(sys.argv) > 3 else "2"
@@ -69,29 +91,17 @@ def main():
         def say(method, predict):
             start = cpu_seconds()
             values, note = predict()
-            off = np.abs(np.log(np.maximum(values, 1e-9) / asked[:, 4]))
-            figures = [np.sqrt(np.mean(off**2)), np.median(off), np.quantile(off, 0.95)]
-            figures = " | ".join(f"{x:.4f}" for x in figures)
-            print(f"| {path.stem} | {method} | {figures} | {cpu_seconds() - start:.1f} | {note} |", flush=True)
+            print(f"| {path.stem} | {method} | {off(values, asked[:, 4])} | {cpu_seconds() - start:.1f} | {note} |", flush=True)
 
         with tempfile.TemporaryDirectory() as at:
             samples, dense = f"{at}/samples.csv", f"{at}/dense.exr"
             pathlib.Path(samples).write_text(table(known, HEADER + ",brdf", 5))
 
             def by_grid():
-                fill = [gonia, "fill", samples, "-o", dense, "--step", step]
-                subprocess.run(fill, check=True, capture_output=True)
-                return ask(gonia, dense, asked, "--grid")
+                return ask(gonia, filled(gonia, samples, dense, step), asked, "--grid")
 
             def by_scipy():
-                rbf = RBFInterpolator(
-                    vectors(known),
-                    np.log(known[:, 4]),
-                    neighbors=min(200, len(known)),
-                    kernel="linear",
-                    smoothing=1e-3,
-                )
-                return np.exp(rbf(vectors(asked))), ""
+                return scipy_logs(vectors(known), known, vectors(asked)), ""
 
             say("query of the samples", lambda: ask(gonia, samples, asked))
             say(f"grid of {step} degrees, filled", by_grid)
@@ -99,4 +109,5 @@ def main():
             say("scipy, linear, logarithms", by_scipy)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,15 +1,15 @@
 //! How many left-out bins, and how many true values, lie within their 95 % intervals.
 //!
-//! `cargo bench -p gonia-brdf --bench error_bars -- [MATERIAL …] [--sparse]`: the paper's plan on the
-//! 2° grid, or every tenth of its frames on 4°. It prints a table: percent in the interior, and in
-//! brackets where either θ is beyond 75°.
+//! `cargo bench -p gonia-brdf --bench error_bars -- [MATERIAL …] [--sparse | --poses N]`: the paper's plan on the
+//! 2° grid, or every tenth of its frames, or about N of them, on 4°. It prints a table: percent in the interior, and in
+//! brackets where either θ is beyond 75°, and where the half vector is within 10° of the normal.
 
 #![allow(clippy::expect_used)]
 
 mod plan;
 
 use gonia_brdf::Elementary;
-use gonia_brdf::direction::Vec3;
+use gonia_brdf::direction::{Vec3, normalize};
 use gonia_brdf::interpolate::cross_validation::Fold;
 use gonia_brdf::interpolate::patches::cover;
 use gonia_brdf::interpolate::refine::Refiner;
@@ -24,39 +24,52 @@ const CELLS: usize = 40;
 /// Views end at this polar angle, degrees.
 const GRAZING_DEG: f64 = 75.0;
 
-/// Shares of what lies within, in the interior and at grazing angles: how much of how much.
+/// In a highlight the half vector is within this of the normal, degrees.
+const HIGHLIGHT_DEG: f64 = 10.0;
+
+/// Shares of what lies within, in the interior, at grazing angles and in the highlight: how much of how much.
 #[derive(Default)]
-struct Shares([[f64; 2]; 2]);
+struct Shares([[f64; 2]; 3]);
 
 impl Shares {
     fn add(&mut self, light: Vec3, view: Vec3, weight: f64, is_within: bool) {
         let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
-        let [within, all] = &mut self.0[usize::from(grazing)];
-        *within += weight * f64::from(u8::from(is_within));
-        *all += weight;
+        let half = normalize([0, 1, 2].map(|k| light[k] + view[k]));
+        let is_bright = half[2] > HIGHLIGHT_DEG.to_radians().cosine();
+        for (k, is_there) in [!grazing, grazing, is_bright].into_iter().enumerate() {
+            if is_there {
+                let [within, all] = &mut self.0[k];
+                *within += weight * f64::from(u8::from(is_within));
+                *all += weight;
+            }
+        }
     }
 }
 
 impl std::fmt::Display for Shares {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let [interior, grazing] = self.0.map(|[within, all]| 100.0 * within / all);
-        write!(f, "{interior:.1} ({grazing:.1})")
+        let [interior, grazing, highlight] = self.0.map(|[within, all]| 100.0 * within / all);
+        write!(f, "{interior:.1} ({grazing:.1}, {highlight:.1})")
     }
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let sparse = arguments.iter().any(|a| a == "--sparse");
+    let few = arguments
+        .iter()
+        .position(|a| a == "--poses")
+        .map(|k| arguments[k + 1].parse().expect("a number"));
     println!(
         "| material | left-out bins, % | interpolated cells, % | measured cells, % | calibration, CPU-s |"
     );
     println!("|---|---|---|---|---|");
     for name in named(&arguments) {
         let model = material(name);
-        let (poses, step) = if sparse {
-            (Poses::tenth(), 4.0)
-        } else {
-            (Poses::paper(), 2.0)
+        let (poses, step) = match few {
+            Some(poses) => (Poses::few(poses), 4.0),
+            None if sparse => (Poses::tenth(), 4.0),
+            None => (Poses::paper(), 2.0),
         };
         let grid = Grid::with_step_deg(step).expect("a grid step");
         let samples = measure_with(&*model, NOISE, &poses);
@@ -73,7 +86,7 @@ fn main() {
     }
 }
 
-/// Bins of other frames than those that the calibration left out.
+/// Bins of other frames than those that the calibration left out; of few frames, which it leaves out all, of the same.
 fn left_out(data: &Data, settings: &FillSettings, calibration: &Calibration) -> Shares {
     let mut shares = Shares::default();
     for number in 0..Fold::usual_number(data.bins()) {

@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
 //! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
-//! `cargo xtask figures fill-fine` measures that.
+//! `cargo xtask figures fill-fine` measures that. `-- --few` prints the table of few samples alone, at random pairs of
+//! directions: time of a grid of 2°, and error and coverage of the fit at others.
 
 #![allow(clippy::expect_used)]
 
@@ -10,7 +11,9 @@ mod plan;
 
 use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
 use gonia_brdf::progress::silent;
-use gonia_brdf::{Bins, Grid};
+use gonia_brdf::random::Random;
+use gonia_brdf::scattered::{FEW_ANISOTROPIC, ScatteredFit};
+use gonia_brdf::{Bins, Brdf, Direction, Elementary, Grid, Sample};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
 use std::time::Instant;
@@ -33,6 +36,9 @@ fn main() {
     if let Some(k) = arguments.iter().position(|a| a == "--row") {
         let number = |by: usize| arguments[k + by].parse::<f64>().expect("a number");
         return measure_row(number(1) as usize, number(2));
+    }
+    if arguments.iter().any(|a| a == "--few") {
+        return few_samples();
     }
     println!(
         "| samples | bins | step | threads | binning, CPU-s | sorting and choosing, CPU-s | fill, CPU-s | all, CPU-s | wall, s | peak, MB |"
@@ -96,4 +102,82 @@ fn peak_mb() -> f64 {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
     kib.map_or(f64::NAN, |kib| kib * 1.024e-3)
+}
+
+/// Numbers of samples at random pairs of directions.
+const FEW: [usize; 5] = [10, 100, 1000, 10_000, 100_000];
+/// Their noise, relative.
+const NOISE: f64 = 0.01;
+/// So many pairs are asked.
+const ASKED: usize = 2000;
+
+fn few_samples() {
+    println!(
+        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | within 95 % bars |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for name in ["satin-paint", "fabric"] {
+        let material = material(name);
+        for samples in FEW {
+            few_row(name, &*material, samples);
+        }
+    }
+}
+
+fn few_row(name: &str, material: &dyn Brdf, count: usize) {
+    let grid = Grid::with_step_deg(2.0).expect("a grid step");
+    let mut random = Random::new(count as u64);
+    let lowest = 80f64.to_radians().cosine();
+    let mut direction = || {
+        let theta = random.between(lowest, 1.0).arc_cosine();
+        Direction::from_deg(theta.to_degrees(), random.between(0.0, 360.0))
+    };
+    let truth = |l: Direction, v: Direction| material.eval(l.to_vec3(), v.to_vec3());
+    let known: Vec<_> = (0..count).map(|_| (direction(), direction())).collect();
+    let asked: Vec<_> = (0..ASKED).map(|_| (direction(), direction())).collect();
+    let mut noise = Random::new(7);
+    let samples: Vec<Sample> = known
+        .iter()
+        .map(|(l, v)| {
+            let value = truth(*l, *v).map(|f| (f * (1.0 + NOISE * noise.normal())) as f32);
+            Sample::new(*l, *v, value)
+        })
+        .collect();
+    let mut last = cpu_seconds();
+    let mut lap = || {
+        let now = cpu_seconds();
+        now - std::mem::replace(&mut last, now)
+    };
+    let fit = ScatteredFit::new(&samples, None).expect("enough samples");
+    let choosing = lap();
+    let symmetry = fit.choice().settings.symmetry;
+    let by_blocks = fit.places() > FEW_ANISOTROPIC && !symmetry.is_isotropic();
+    let times = [false, true].map(|with_errors| {
+        if by_blocks && with_errors {
+            return "by blocks".to_owned();
+        } else if by_blocks {
+            let bins = Bins::new(grid, &symmetry.completed(samples.clone()));
+            let data = Data::new(&bins);
+            let settings = select(&data, FillSettings::DEFAULT).settings;
+            drop(fill(&data, &settings, &silent).expect("enough bins"));
+        } else {
+            drop(fit.dense(grid, with_errors));
+        }
+        format!("{:.1}", lap())
+    });
+    let (mut squares, mut within) = (0.0, 0.0);
+    for ((value, error), (l, v)) in fit.at_all(&asked).iter().zip(&asked) {
+        let truth = truth(*l, *v);
+        for c in 0..3 {
+            squares += (value[c] / truth[c]).natural_log().powi(2);
+            within += f64::from(u8::from((value[c] - truth[c]).abs() <= 1.96 * error[c]));
+        }
+    }
+    let all = 3.0 * ASKED as f64;
+    println!(
+        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.1} % |",
+        times.join(" | "),
+        (squares / all).sqrt(),
+        100.0 * within / all,
+    );
 }

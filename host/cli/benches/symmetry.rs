@@ -12,7 +12,7 @@ mod measured;
 use cpu_time::ProcessTime;
 use drawing::{Line, draw};
 use gonia_brdf::direction::{Vec3, normalize};
-use gonia_brdf::model::Material;
+use gonia_brdf::model::{Ggx, Material};
 use gonia_brdf::{Brdf, Elementary, Pose, SymmetryKind};
 use gonia_pipeline::{FillOptions, fill, silent};
 use gonia_plan::symmetry::is_needed;
@@ -48,18 +48,30 @@ impl Brdf for Leaning {
     }
 }
 
+/// Alike in all azimuths.
+fn gloss() -> Ggx {
+    Ggx {
+        diffuse: [0.1, 0.2, 0.3],
+        specular: [1.0; 3],
+        f0: 0.04,
+        alpha_x: 0.2,
+        alpha_y: 0.2,
+        azimuth_deg: 0.0,
+    }
+}
+
 fn cases() -> [Case; 3] {
-    let named = |name| Material::named(name).expect("a material").brdf;
+    let weave = Material::named("fabric").expect("a material").brdf;
     [
         Case {
             name: "weave",
-            brdf: named("fabric"),
+            brdf: weave,
             symmetry: SymmetryKind::HalfTurnBilateral,
             plane_deg: 23.0,
         },
         Case {
-            name: "isotropic paint",
-            brdf: named("satin-paint"),
+            name: "isotropic gloss",
+            brdf: Arc::new(gloss()),
             symmetry: SymmetryKind::Isotropic,
             plane_deg: 0.0,
         },

@@ -402,3 +402,49 @@ fn a_symmetry_that_samples_contradict_is_remarked_on_and_one_that_they_show_is_n
         assert_eq!(found, contradicted, "{share}: {said:?}");
     }
 }
+
+#[test]
+fn a_stated_plane_that_samples_contradict_is_remarked_on_with_by_how_much() {
+    // Wide along x: its planes lie at azimuths 0 and 90.
+    let material = |light: Direction, view: Direction| {
+        let [i, v] = [light, view].map(Direction::to_vec3);
+        let sum = [0, 1, 2].map(|k| i[k] + v[k]);
+        let slope2 = (sum[0] / 1.5).powi(2) + (1.5 * sum[1]).powi(2);
+        0.05 + 0.2 * (-slope2 / (0.3 * sum[2] * sum[2])).exponential()
+    };
+    let mut random = Random::new(5);
+    let mut direction =
+        || Direction::from_deg(random.between(0.0, 75.0), random.between(0.0, 360.0));
+    let scattered: Vec<Sample> = (0..900)
+        .map(|_| {
+            let (light, view) = (direction(), direction());
+            Sample::new(light, view, [material(light, view) as f32; 3])
+        })
+        .collect();
+    // In frames of many samples, they are not few and blocks fill them.
+    let framed = scattered.iter().zip(0..).map(|(s, k)| s.in_frame(k / 20));
+    for samples in [scattered.clone(), framed.collect()] {
+        for (plane_deg, contradicted) in [(90.0, false), (40.0, true)] {
+            let options = FillOptions {
+                symmetry: Some(SymmetryKind::Bilateral),
+                plane_deg: Some(plane_deg),
+                ..FillOptions::with_step_deg(30.0)
+            };
+            let filled = fill(samples.clone(), Scale::Absolute, &options, &silent).unwrap();
+            let said: Vec<String> = filled
+                .account
+                .remarks
+                .iter()
+                .map(ToString::to_string)
+                .collect();
+            let found = said.iter().find(|s| s.contains("contradict the symmetry"));
+            assert_eq!(found.is_some(), contradicted, "{plane_deg}: {said:?}");
+            assert!(found.is_none_or(|s| s.contains("azimuth 40.0") && s.contains(" % off")));
+            let symmetry = &filled.dense.provenance["symmetry"];
+            assert!(
+                symmetry.starts_with("bilateral about azimuth"),
+                "{symmetry}"
+            );
+        }
+    }
+}

@@ -99,6 +99,17 @@ impl Poses {
         }
     }
 
+    /// About so many of the paper's, of no regular pattern.
+    pub fn few(poses: usize) -> Self {
+        let all = Self::paper();
+        let one_in = all.lights.len() * all.views.len() / poses.max(1);
+        // An odd number shares no factor with the rings' 6, 12, ...
+        Self {
+            one_in: one_in | 1,
+            ..all
+        }
+    }
+
     /// The 925 of the quick demo: 37 lights, 25 views.
     pub fn quick() -> Self {
         let rings = [(0.0, 1), (25.0, 5), (50.0, 8), (73.0, 11)];

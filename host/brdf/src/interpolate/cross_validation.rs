@@ -25,6 +25,8 @@ const CLUSTER_DEG: f64 = 15.0;
 const MATES: usize = 64;
 /// Folds where there are few bins: one would decide by chance, and several are cheap then.
 const FOLDS: u32 = 4;
+/// Errors of so many groups, at least, are to be seen where there are as many.
+const GROUPS: usize = 64;
 
 /// All bins, divided into those that predict and those that are predicted.
 pub struct Fold<'a, const N: usize = 3> {
@@ -60,6 +62,8 @@ pub struct Prediction<'a, const N: usize = 3> {
 pub struct MeanPrediction<'a, const N: usize = 3> {
     /// One of them.
     pub first: Prediction<'a, N>,
+    /// Number of their frame (or cluster).
+    pub group: u32,
     /// All of them.
     pub bins: Vec<&'a Bin<N>>,
     /// Mean logarithm of predicted over measured, of channels that can have one.
@@ -108,6 +112,22 @@ impl<'a, const N: usize> Fold<'a, N> {
         } else {
             1
         }
+    }
+
+    /// How many folds of one in `one_in` to take so that errors that groups have in common are seen of many: of few
+    /// frames (or clusters) all are left out in turn.
+    pub fn number_of_many_groups(bins: &Bins<N>, one_in: u32) -> u32 {
+        let usual = Self::usual_number(bins);
+        let bins = bins.bins();
+        if bins.len() >= MANY_BINS {
+            return usual;
+        }
+        let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
+        let mut groups: Vec<u32> = bins.iter().map(|bin| group_of(bin, framed)).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        let needed = (GROUPS * one_in as usize).div_ceil(groups.len().max(1));
+        (needed as u32).clamp(usual, one_in.max(usual))
     }
 
     /// Predicts the tests, by the very blocks that a fill of these data (of the same bins) with these
@@ -193,6 +213,7 @@ impl<'a, const N: usize> Fold<'a, N> {
                         residual: residual(bin, predicted.logs[0]),
                         variance: predicted.variance,
                     },
+                    group: group_of(bin, self.framed),
                     bins: members.iter().map(|m| m.bin).collect(),
                     residual: [Some(0.0); N],
                     variance: predicted.variance_of_mean,

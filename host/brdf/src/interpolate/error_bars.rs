@@ -45,6 +45,9 @@ const PERCENTILE_SPREAD: f32 = 1.9;
 const NOISE_SPREAD: f32 = 0.1;
 /// A bin whose predicted variance is less than this share of its noise's shows the noise alone.
 const NOISE_ALONE: f32 = 0.1;
+/// Values beyond the first of these shares of the tested ones are bright, beyond the second very bright: half of what is
+/// tested is of the brightest tenth of all.
+const BRIGHT: [f32; 2] = [0.5, 0.9];
 
 /// Standard errors of a dense BRDF.
 #[derive(Clone, Debug)]
@@ -71,10 +74,10 @@ impl<const N: usize> ErrorBars<N> {
 /// What turns a block's variance into a standard error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// By [`Calibration::part`]: interior and grazing, each of usual brightness and bright.
-    parts: [Classes; 4],
-    /// Mean logarithm over the channels above which a value is bright.
-    bright: f32,
+    /// By [`Calibration::part`]: interior and grazing, each of usual brightness, bright and very bright.
+    parts: [Classes; 6],
+    /// Mean logarithms over the channels above which a value is bright, and very bright.
+    bright: [f32; 2],
     noise: BinNoise,
 }
 
@@ -105,7 +108,7 @@ impl Calibration {
         let bins = data.bins();
         let sorted = data.sorted_for(settings.coordinates);
         let data = sorted.as_ref().unwrap_or(data);
-        let folds = Fold::usual_number(bins);
+        let folds = Fold::number_of_many_groups(bins, ONE_IN);
         let mut means = Vec::new();
         for number in 0..folds {
             let number = ONE_IN - 1 - number;
@@ -121,31 +124,34 @@ impl Calibration {
     fn from_means<const N: usize>(means: &[MeanPrediction<N>], noise_variance: f32) -> Self {
         let mut logs: Vec<f32> = means.iter().map(|m| mean(m.first.log)).collect();
         logs.sort_by(f32::total_cmp);
-        // The brightest tenth of all is about half of the bins that a fold tests.
-        let bright = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
+        let at = |share: f32| logs.get((share * logs.len() as f32) as usize);
+        let bright = BRIGHT.map(|share| at(share).copied().unwrap_or(0.0));
         let noise = BinNoise::new(means, noise_variance);
         let mut calibration = Self {
-            parts: [(); 4].map(|()| Classes::new::<N>(&[], &noise)),
+            parts: [(); 6].map(|()| Classes::new::<N>(&[], &noise)),
             bright,
             noise,
         };
         let all: Vec<&MeanPrediction<N>> = means.iter().collect();
-        for part in 0..4 {
+        for part in 0..6 {
             let of_part = |m: &&MeanPrediction<N>| {
                 let bin = m.first.bin;
                 let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
                 calibration.part(light, view, m.first.log) == part
             };
             let own: Vec<&MeanPrediction<N>> = all.iter().copied().filter(of_part).collect();
-            let enough = own.len() >= CLASS_MIN;
-            calibration.parts[part] = Classes::new(if enough { &own } else { &all }, &noise);
+            calibration.parts[part] = match own.len() >= CLASS_MIN {
+                true => Classes::new(&own, &noise),
+                false => Classes::of_rare(&own, &Classes::new(&all, &noise), &noise),
+            };
         }
         calibration
     }
 
     fn part<const N: usize>(&self, light: Vec3, view: Vec3, log: [f32; N]) -> usize {
         let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
-        2 * usize::from(grazing) + usize::from(mean(log) > self.bright)
+        let brighter = self.bright.iter().filter(|bright| mean(log) > **bright);
+        3 * usize::from(grazing) + brighter.count()
     }
 
     /// Standard error of the logarithm, per channel, from a block's logarithm and its variance.
@@ -237,6 +243,11 @@ impl Residual {
         })
     }
 
+    /// The square of the factor with which it just lies within, the noise aside.
+    fn beyond_noise(&self) -> f32 {
+        (self.limit - self.noise) / self.variance
+    }
+
     /// Those of the channels of a mean.
     fn of_mean<'a, const N: usize>(
         mean: &'a MeanPrediction<'a, N>,
@@ -268,7 +279,7 @@ impl Classes {
             }
             let (class, others) = rest.split_at(n);
             limits.extend(class.last().map(|last| size(last)));
-            factors.push(factor_of(class, noise));
+            factors.push(factor_of(class, noise) * of_few_groups(class));
             rest = others;
         }
         limits.pop();
@@ -286,6 +297,29 @@ impl Classes {
         Self { limits, factors }
     }
 
+    /// Of too few to say much: the widest of what all others say, or wider where its own members are.
+    fn of_rare<const N: usize>(
+        means: &[&MeanPrediction<N>],
+        others: &Self,
+        noise: &BinNoise,
+    ) -> Self {
+        let mut squares: Vec<f32> = means
+            .iter()
+            .flat_map(|mean| Residual::of_mean(mean, noise))
+            .map(|r| r.beyond_noise())
+            .collect();
+        let own = quantile(&mut squares, 0.95).unwrap_or(0.0).max(0.0).sqrt();
+        let widest = others
+            .factors
+            .iter()
+            .copied()
+            .fold(own * of_few_groups(means), f32::max);
+        Self {
+            limits: Vec::new(),
+            factors: vec![widest],
+        }
+    }
+
     fn factor(&self, size: f32) -> f32 {
         let class = self.limits.partition_point(|limit| *limit < size);
         self.factors[class.min(self.factors.len() - 1)]
@@ -301,10 +335,7 @@ fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> 
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
         .collect();
-    let mut squares: Vec<f32> = all
-        .iter()
-        .map(|r| (r.limit - r.noise) / r.variance)
-        .collect();
+    let mut squares: Vec<f32> = all.iter().map(Residual::beyond_noise).collect();
     let usual = USUAL_FACTOR * USUAL_FACTOR;
     let Some(square) = quantile(&mut squares, 0.95) else {
         return USUAL_FACTOR;
@@ -317,6 +348,21 @@ fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> 
     let uncertainty = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
     let weight = 1.0 / (1.0 + uncertainty);
     (weight * square.max(0.0) + (1.0 - weight) * usual).sqrt()
+}
+
+/// Errors of a frame (or cluster) come together: of few of them the 95th percentile is that of Student's distribution, over
+/// that of a normal one.
+fn of_few_groups<const N: usize>(class: &[&MeanPrediction<N>]) -> f32 {
+    let mut groups: Vec<u32> = class.iter().map(|mean| mean.group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    // The first terms of its expansion by the degrees of freedom, above one within 4 % of it.
+    let freedom = (groups.len() as f32 - 1.0).max(2.0);
+    let z2 = Z95 * Z95;
+    let first = (z2 + 1.0) / (4.0 * freedom);
+    let second = (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / (96.0 * freedom * freedom);
+    let third = (3.0 * z2.powi(3) + 19.0 * z2 * z2 + 17.0 * z2 - 15.0) / (384.0 * freedom.powi(3));
+    1.0 + first + second + third
 }
 
 fn size<const N: usize>(variance: [f32; N]) -> f32 {

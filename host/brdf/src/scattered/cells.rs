@@ -375,7 +375,7 @@ impl Filler<'_> {
         let shares = Shares {
             systems,
             cells,
-            tolerance: (TOLERANCE * relative).max(TOLERANCE_MIN),
+            tolerance: (TOLERANCE * self.fit.choice.error_factor * relative).max(TOLERANCE_MIN),
             errors,
         };
         self.refine(&shares, cells, memory);

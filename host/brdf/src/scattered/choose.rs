@@ -3,7 +3,7 @@
 use super::data::{Data, Datum};
 use super::local::{Local, Predicted};
 use super::merge::{Merged, Without};
-use super::mirror::mirror_plane;
+use super::mirror::{half_turn_is_measured, least, mirror_plane};
 use super::places::{Near, Places, exchanged};
 use super::residual::{RESIDUAL_MAX, loss, residual, size};
 use super::{NEIGHBOURS_MOST, ScatteredKernel, Settings, preferred};
@@ -20,6 +20,10 @@ const TESTS: usize = 240;
 const MANY_TESTS: usize = 1500;
 /// With fewer places than this a plane of symmetry is searched for only on request.
 const PLANE_MIN: usize = 60;
+/// A plane that was found is looked for again within so many degrees, with all that a fit takes from both of its sides …
+const PLANE_WITHIN_DEG: f64 = 3.0;
+/// … to about this.
+const PLANE_NEAR_DEG: f64 = 0.3;
 /// Fewer tests than this are no evidence.
 const TESTS_MIN: usize = 24;
 /// In the search for a dependence on the azimuth a residual beyond so many times the median of all counts as that.
@@ -41,9 +45,10 @@ const SAME_DEG: f64 = 1.0;
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 const Z95: f64 = 1.96;
 /// The factor of standard errors where nothing was tested: rather wide.
-const UNTESTED_FACTOR: f64 = 2.0;
-/// Tested factors lie between these.
-const FACTORS: (f64, f64) = (1.0, 20.0);
+const UNTESTED_FACTOR: f64 = 3.0;
+/// Tested factors lie between these: a system takes its kernel and its nugget for known, which are of the same data, so
+/// that its own errors are too small even where tests are nearly all noise.
+const FACTORS: (f64, f64) = (1.2, 20.0);
 
 /// Kernels and nuggets that compete: smooth to rough, little noise to much.
 const KERNELS: [(ScatteredKernel, f64); 6] = [
@@ -127,7 +132,43 @@ impl Choice {
     }
 }
 
-pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
+/// A symmetry that was asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Asked {
+    pub kind: SymmetryKind,
+    /// Its plane, where that is known.
+    pub plane: Option<MirrorPlane>,
+}
+
+impl Asked {
+    fn untested(self) -> Symmetry {
+        match (self.kind, self.plane) {
+            (SymmetryKind::Bilateral, Some(plane)) => Symmetry::Bilateral(plane),
+            (SymmetryKind::HalfTurnBilateral, Some(plane)) => Symmetry::HalfTurnBilateral(plane),
+            (kind, _) => kind.untested(),
+        }
+    }
+}
+
+/// The symmetries that compete, without a plane, the simplest first.
+fn symmetries(data: &Data, asked: Option<SymmetryKind>, one_azimuth: bool) -> &'static [Symmetry] {
+    match asked {
+        Some(SymmetryKind::Isotropic) => &[Symmetry::Isotropic, Symmetry::Turns],
+        Some(SymmetryKind::HalfTurn | SymmetryKind::HalfTurnBilateral) => &[Symmetry::HalfTurn],
+        Some(SymmetryKind::None | SymmetryKind::Bilateral) => &[Symmetry::None],
+        None if one_azimuth => &[Symmetry::Isotropic, Symmetry::Turns],
+        None if half_turn_is_measured(data, Settings::DEFAULT) => &[
+            Symmetry::Isotropic,
+            Symmetry::Turns,
+            Symmetry::HalfTurn,
+            Symmetry::None,
+        ],
+        None => &[Symmetry::Isotropic, Symmetry::Turns, Symmetry::None],
+    }
+}
+
+pub(super) fn choose(data: &Data, wanted: Option<Asked>) -> Choice {
+    let asked = wanted.map(|asked| asked.kind);
     let one_azimuth = has_one_azimuth(&data.places);
     let reason = match asked {
         Some(_) => Reason::Asked,
@@ -136,21 +177,9 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
     };
     let tests = Tests::new(data, TESTS);
     if tests.numbers.len() < TESTS_MIN {
-        return untested(asked, reason);
+        return untested(wanted, reason);
     }
-    let symmetries: &[Symmetry] = match asked {
-        Some(SymmetryKind::Isotropic) => &[Symmetry::Isotropic, Symmetry::Turns],
-        Some(SymmetryKind::HalfTurn | SymmetryKind::HalfTurnBilateral) => &[Symmetry::HalfTurn],
-        Some(SymmetryKind::None | SymmetryKind::Bilateral) => &[Symmetry::None],
-        None if one_azimuth => &[Symmetry::Isotropic, Symmetry::Turns],
-        None => &[
-            Symmetry::Isotropic,
-            Symmetry::Turns,
-            Symmetry::HalfTurn,
-            Symmetry::None,
-        ],
-    };
-    let first: Vec<Trial> = symmetries
+    let first: Vec<Trial> = symmetries(data, asked, one_azimuth)
         .iter()
         .flat_map(|symmetry| {
             [true, false].map(|reciprocal_data| Settings {
@@ -169,16 +198,15 @@ pub(super) fn choose(data: &Data, asked: Option<SymmetryKind>) -> Choice {
         .collect();
     let may_depend_on_azimuth = asked.is_none() && !one_azimuth;
     let start = simplest(&trials, &tests, usual, may_depend_on_azimuth);
-    let start = match start.settings.symmetry.is_isotropic() {
-        true => start,
-        false => with_plane(&trials, &tests, usual, asked),
+    let mut best = match start.settings.symmetry.is_isotropic() {
+        true => tests.tuned(start, usual),
+        false => with_plane(&trials, &tests, usual, wanted),
     };
-    let mut best = tests.tuned(start, usual);
     if may_depend_on_azimuth && best.settings.symmetry.is_isotropic() {
         // A weak dependence takes more tests, and the settings with the least error of their own.
         let many = Tests::new(data, MANY_TESTS);
         if many.shows_azimuth(&many.trial(best.settings)) {
-            best = tests.tuned(with_plane(&trials, &tests, usual, asked), usual);
+            best = with_plane(&trials, &tests, usual, wanted);
         }
         if best.settings.symmetry.is_isotropic() {
             best = tests.trial(Settings {
@@ -206,14 +234,14 @@ fn asks_for_plane(asked: Option<SymmetryKind>) -> bool {
 }
 
 /// What is taken of too few data to test anything by.
-fn untested(asked: Option<SymmetryKind>, reason: Reason) -> Choice {
+fn untested(asked: Option<Asked>, reason: Reason) -> Choice {
     let reason = if reason == Reason::Shown {
         Reason::TooFew
     } else {
         reason
     };
     let settings = Settings {
-        symmetry: asked.map_or(Settings::FEW.symmetry, SymmetryKind::untested),
+        symmetry: asked.map_or(Settings::FEW.symmetry, Asked::untested),
         ..Settings::FEW
     };
     Choice {
@@ -224,44 +252,71 @@ fn untested(asked: Option<SymmetryKind>, reason: Reason) -> Choice {
 
 /// The simplest anisotropic trial that the data do not contradict, those with a plane among them: about the azimuth
 /// that predicts best.
-fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, asked: Option<SymmetryKind>) -> Trial {
+fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, wanted: Option<Asked>) -> Trial {
     let of = |symmetry: Symmetry| {
         let own = trials
             .iter()
             .filter(move |t| t.settings.symmetry == symmetry);
         own.cloned().collect::<Vec<Trial>>()
     };
-    let with = [of(Symmetry::HalfTurn), of(Symmetry::None)].concat();
-    let start = simplest(&with, tests, usual, false);
+    let [half_turn, none] = [Symmetry::HalfTurn, Symmetry::None].map(of);
+    let start = simplest(&[&half_turn[..], &none].concat(), tests, usual, false);
+    // With more images of the data neighbours are nearer, and more of what they differ by is noise: only trials that
+    // know it compare.
+    let start = tests.tuned(start, usual);
+    let asked = wanted.map(|asked| asked.kind);
     let (turned, alone) = match asked {
         None if tests.data.places.len() < PLANE_MIN => return start,
-        None => (true, true),
+        None => (!half_turn.is_empty(), true),
         Some(SymmetryKind::HalfTurnBilateral) => (true, false),
         Some(SymmetryKind::Bilateral) => (false, true),
         _ => return start,
     };
-    let mirror = mirror_plane(tests.data, start.settings);
-    let Some(plane) = mirror.plane else {
-        return start;
-    };
-    let trial = |symmetry: fn(MirrorPlane) -> Symmetry| {
+    let at = |symmetry: fn(MirrorPlane) -> Symmetry, plane: MirrorPlane| {
         tests.trial(Settings {
             symmetry: symmetry(plane),
             ..start.settings
         })
     };
-    let mut all = Vec::new();
-    if turned {
-        all.push(trial(Symmetry::HalfTurnBilateral));
+    let both = |plane| {
+        let turned = turned.then(|| at(Symmetry::HalfTurnBilateral, plane));
+        let alone = alone.then(|| at(Symmetry::Bilateral, plane));
+        (turned, alone)
+    };
+    if let Some(plane) = wanted.and_then(|asked| asked.plane) {
+        let (turned, alone) = both(plane);
+        return turned.or(alone).unwrap_or(start);
     }
+    let mirror = mirror_plane(tests.data, start.settings);
+    let Some(plane) = mirror.plane else {
+        return start;
+    };
+    // About the plane of what has no half-turn, one with it would be found elsewhere.
+    let kind = match start.settings.symmetry.has_half_turn() {
+        true => Symmetry::HalfTurnBilateral,
+        false => Symmetry::Bilateral,
+    };
+    let level = |azimuth_deg: f64| -at(kind, MirrorPlane::at_deg(azimuth_deg)).score();
+    let (from, to) = (
+        plane.azimuth_deg() - PLANE_WITHIN_DEG,
+        plane.azimuth_deg() + PLANE_WITHIN_DEG,
+    );
+    let plane = MirrorPlane::at_deg(least(level, from, to, PLANE_NEAR_DEG));
+    let (with_both, with_plane) = both(plane);
+    let mut all: Vec<Trial> = with_both.into_iter().collect();
+    let without = |symmetry: Symmetry| match symmetry == start.settings.symmetry {
+        true => start.clone(),
+        false => tests.trial(Settings {
+            symmetry,
+            ..start.settings
+        }),
+    };
+    if asked.is_none() && turned {
+        all.push(without(Symmetry::HalfTurn));
+    }
+    all.extend(with_plane);
     if asked.is_none() {
-        all.extend(of(Symmetry::HalfTurn));
-    }
-    if alone {
-        all.push(trial(Symmetry::Bilateral));
-    }
-    if asked.is_none() {
-        all.extend(of(Symmetry::None));
+        all.push(without(Symmetry::None));
     }
     let best = simplest(&all, tests, usual, false);
     // One that the data contradict is not the one that was asked for where that may be another.

@@ -1,14 +1,13 @@
 //! The plane on whose two sides a material is most alike.
 
 use super::Settings;
-use super::data::Data;
+use super::data::{Data, Datum};
 use super::local::Local;
 use super::merge::Merged;
 use super::places::Places;
-use super::residual::{loss, residual, size};
+use super::residual::{residual, size};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
-use crate::interpolate::coordinates::Pair;
 use crate::symmetry::MirrorPlane;
 use rayon::prelude::*;
 
@@ -18,8 +17,11 @@ const TESTS: usize = 320;
 const STEP_DEG: f64 = 7.5;
 /// … and the nearest is found to about this.
 const NEAR_DEG: f64 = 0.5;
-/// A place is measured on the other side where its error there is at most so many times that of most of the places …
-const MEASURED: f64 = 2.0;
+/// So many of the data are near to a place, where it was measured.
+const NEAREST: usize = 3;
+/// A place is measured on the other side where the data there are at most so many times as far as around most of the
+/// places …
+const MEASURED: f64 = 1.5;
 /// … and a plane is compared with others where so large a share of places is.
 const COMPARED: f64 = 0.5;
 /// The golden section.
@@ -33,64 +35,120 @@ pub(super) struct Mirror {
     pub is_determined: bool,
 }
 
-/// Looks for the plane.
-pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
-    let merged = Merged::new(data, &settings).data;
-    let places = Places::new(&merged, &settings);
-    let count = data.places.len().min(TESTS);
-    let tests: Vec<usize> = (0..count)
-        .map(|k| (k * data.places.len() + data.places.len() / 2) / count)
-        .collect();
-    let predicted = |number: &usize, place: Pair| {
-        let test = &data.places[*number];
-        let keep = |datum: u32| merged[datum as usize].group != test.group;
-        let near = places.around(place, settings.neighbours, &settings, keep);
-        let found = Local::fit(&merged, &near, &settings)?.at(&place);
-        let residual = [0, 1, 2].map(|c| residual(found.value[c], test.value[c]));
-        Some((found.relative[1], residual))
-    };
-    let sorted = |turned: &(dyn Fn(Vec3) -> Vec3 + Sync)| {
-        let one = |number: &usize| {
-            let test = &data.places[*number];
+/// Places of the data, and what the others predict where these lie by a turn or beyond a plane.
+struct Images<'a> {
+    data: &'a Data,
+    settings: Settings,
+    merged: Vec<Datum>,
+    places: Places,
+    tests: Vec<usize>,
+    /// Within this distance lie data of others around most of the places.
+    usual_distance: f64,
+}
+
+/// What is predicted of a place at its image.
+struct Found {
+    /// From the image to the nearest data.
+    distance: f64,
+    /// Logarithm of predicted over measured, mean over the channels, and its variance as the data around show it.
+    residual: f64,
+    variance: f64,
+}
+
+impl Found {
+    /// What it says against the symmetry: as Student's distribution with four degrees of freedom has it, by the error
+    /// that is to be expected there. The slope of a lobe says more of where a plane is than all that is flat.
+    fn against(&self, usual: f64) -> f64 {
+        let variance = self.variance + usual * usual;
+        (1.0 + self.residual.powi(2) / (4.0 * variance)).natural_log()
+    }
+}
+
+impl<'a> Images<'a> {
+    fn new(data: &'a Data, settings: Settings) -> Self {
+        let merged = Merged::new(data, &settings).data;
+        let count = data.places.len().min(TESTS);
+        let tests = (0..count).map(|k| (k * data.places.len() + data.places.len() / 2) / count);
+        let mut images = Self {
+            data,
+            settings,
+            places: Places::new(&merged, &settings),
+            merged,
+            tests: tests.collect(),
+            usual_distance: 0.0,
+        };
+        let here = images.sorted(&|v| v);
+        images.usual_distance = here
+            .get(here.len() * 3 / 4)
+            .map_or(0.0, |found| found.distance);
+        images
+    }
+
+    /// What is found of each test at its image, from the nearest to others on.
+    fn sorted(&self, image: &(dyn Fn(Vec3) -> Vec3 + Sync)) -> Vec<Found> {
+        let predicted = |number: &usize| {
+            let (test, settings) = (&self.data.places[*number], &self.settings);
             let place = settings
                 .coordinates
-                .pair(turned(test.light), turned(test.view));
-            predicted(number, place)
+                .pair(image(test.light), image(test.view));
+            let keep = |datum: u32| self.merged[datum as usize].group != test.group;
+            let near = self
+                .places
+                .around(place, settings.neighbours, settings, keep);
+            let found = Local::fit(&self.merged, &near, settings)?.at(&place);
+            let residuals = [0, 1, 2].map(|c| residual(found.value[c], test.value[c]));
+            let nearest = near.get(NEAREST - 1).or(near.last())?;
+            Some(Found {
+                distance: nearest.distance(),
+                residual: size(&residuals),
+                variance: found.relative[1].powi(2) + found.noise[1],
+            })
         };
-        let mut found: Vec<(f64, [f64; 3])> = tests.par_iter().filter_map(one).collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut found: Vec<Found> = self.tests.par_iter().filter_map(predicted).collect();
+        found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
         found
-    };
-    let here = sorted(&|v| v);
-    let usual_error = here.get(here.len() * 3 / 4).map_or(0.0, |found| found.0);
-    // Where little was measured on the other side, nothing speaks for or against the plane.
-    let residuals = |azimuth_deg: f64| -> Option<Vec<[f64; 3]>> {
+    }
+
+    /// Those that were measured at their image, too: `None` where these are too few, and nothing speaks for or against
+    /// it.
+    fn measured(&self, image: &(dyn Fn(Vec3) -> Vec3 + Sync)) -> Option<Vec<Found>> {
+        let mut found = self.sorted(image);
+        let compared = (COMPARED * self.tests.len() as f64).ceil() as usize;
+        found.retain(|found| found.distance <= MEASURED * self.usual_distance);
+        (found.len() >= compared).then_some(found)
+    }
+
+    fn beyond(&self, azimuth_deg: f64) -> Option<Vec<Found>> {
         let (sin, cos) = (2.0 * azimuth_deg).to_radians().sine_cosine();
-        let mut found = sorted(&|v| [cos * v[0] + sin * v[1], sin * v[0] - cos * v[1], v[2]]);
-        let compared = (COMPARED * tests.len() as f64).ceil() as usize;
-        let last = found.get(compared.saturating_sub(1))?;
-        if last.0 > MEASURED * usual_error {
-            return None;
-        }
-        found.truncate(compared);
-        Some(found.into_iter().map(|(_, residual)| residual).collect())
-    };
+        self.measured(&|v| [cos * v[0] + sin * v[1], sin * v[0] - cos * v[1], v[2]])
+    }
+}
+
+/// Whether data lie where half a turn takes others: else nothing speaks for or against that symmetry.
+pub(super) fn half_turn_is_measured(data: &Data, settings: Settings) -> bool {
+    let images = Images::new(data, settings);
+    images.measured(&|v| [-v[0], -v[1], v[2]]).is_some()
+}
+
+/// Looks for the plane.
+pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
+    let images = Images::new(data, settings);
     let planes = (180.0 / STEP_DEG) as usize;
-    let all: Vec<Option<Vec<[f64; 3]>>> = (0..planes)
-        .map(|k| residuals(k as f64 * STEP_DEG))
+    let all: Vec<Option<Vec<Found>>> = (0..planes)
+        .map(|k| images.beyond(k as f64 * STEP_DEG))
         .collect();
     // The usual size is that about the best plane, however few places agree with the others.
-    let median = |residuals: &Vec<[f64; 3]>| {
-        let mut sizes: Vec<f64> = residuals.iter().map(size).collect();
+    let median = |found: &Vec<Found>| {
+        let mut sizes: Vec<f64> = found.iter().map(|found| found.residual).collect();
         sizes.sort_by(f64::total_cmp);
         sizes.get(sizes.len() / 2).copied().unwrap_or(1.0)
     };
     let medians = all.iter().flatten().map(median);
     let usual = medians.fold(1.0, f64::min).max(1e-6);
-    let level = |residuals: &Option<Vec<[f64; 3]>>| match residuals {
-        Some(residuals) => {
-            let sum: f64 = residuals.iter().map(|r| loss(r, usual)).sum();
-            sum / residuals.len().max(1) as f64
+    let level = |found: &Option<Vec<Found>>| match found {
+        Some(found) => {
+            let sum: f64 = found.iter().map(|found| found.against(usual)).sum();
+            sum / found.len().max(1) as f64
         }
         None => f64::INFINITY,
     };
@@ -104,19 +162,19 @@ pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
         };
     };
     let around = best as f64 * STEP_DEG;
-    let at = |azimuth_deg: f64| level(&residuals(azimuth_deg));
-    let azimuth_deg = least(at, around - STEP_DEG, around + STEP_DEG);
+    let at = |azimuth_deg: f64| level(&images.beyond(azimuth_deg));
+    let azimuth_deg = least(at, around - STEP_DEG, around + STEP_DEG, NEAR_DEG);
     Mirror {
         plane: Some(MirrorPlane::at_deg(azimuth_deg)),
         is_determined,
     }
 }
 
-/// Where a function of an azimuth is least between two, by the golden section.
-fn least(at: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+/// Where a function of an azimuth is least between two, by the golden section, to about so many degrees.
+pub(super) fn least(at: impl Fn(f64) -> f64, mut low: f64, mut high: f64, near_deg: f64) -> f64 {
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
     let mut found = inner.map(&at);
-    while high - low > NEAR_DEG {
+    while high - low > near_deg {
         if found[0] < found[1] {
             high = inner[1];
             inner = [high - GOLDEN * (high - low), inner[0]];

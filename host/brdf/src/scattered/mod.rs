@@ -27,7 +27,8 @@ use crate::grid::Grid;
 use crate::interpolate::Coordinates;
 use crate::interpolate::coordinates::Pair;
 use crate::sample::Sample;
-use crate::symmetry::{Symmetry, SymmetryKind};
+use crate::symmetry::{MirrorPlane, Symmetry, SymmetryKind};
+use choose::Asked;
 use data::{Data, Datum};
 use local::{Local, Predicted};
 use merge::Merged;
@@ -220,11 +221,22 @@ pub fn is_few(samples: &[Sample]) -> bool {
 impl ScatteredFit {
     /// Fits samples, with a given symmetry or, without one, with what they show. `None` of too few.
     pub fn new(samples: &[Sample], symmetry: Option<SymmetryKind>) -> Option<Self> {
+        let asked = symmetry.map(|kind| Asked { kind, plane: None });
+        Self::asked(samples, asked)
+    }
+
+    /// Fits samples with a symmetry about a plane that is known. `None` of too few.
+    pub fn about_plane(samples: &[Sample], kind: SymmetryKind, plane: MirrorPlane) -> Option<Self> {
+        let plane = Some(plane);
+        Self::asked(samples, Some(Asked { kind, plane }))
+    }
+
+    fn asked(samples: &[Sample], asked: Option<Asked>) -> Option<Self> {
         let data = Data::new(samples);
         if data.places.len() < PLACES_MIN {
             return None;
         }
-        let choice = choose::choose(&data, symmetry);
+        let choice = choose::choose(&data, asked);
         Some(Self::chosen(&data, choice))
     }
 
@@ -514,6 +526,50 @@ mod tests {
             assert_eq!(
                 asked.choice().plane_undetermined,
                 symmetry.plane().is_none()
+            );
+        }
+    }
+
+    #[test]
+    fn half_a_turn_of_which_one_side_was_measured_is_not_taken() {
+        // A wave along x, which half a turn turns over; lights and views on one side.
+        let value = |l: Direction, v: Direction| {
+            material(l, v, 1.4, 0.0) * (1.0 + 0.3 * (l.to_vec3()[0] + v.to_vec3()[0]))
+        };
+        for (low, high) in [(0.0, 90.0), (20.0, 110.0)] {
+            let of_side: Vec<Sample> = samples(12000, false, |l, v, normal| {
+                value(l, v) * (1.0 + 0.005 * normal)
+            })
+            .into_iter()
+            .filter(|s| {
+                [s.phi_i_deg, s.phi_v_deg]
+                    .iter()
+                    .all(|phi| (low..high).contains(phi))
+            })
+            .take(400)
+            .collect();
+            let fit = ScatteredFit::new(&of_side, None).unwrap();
+            let symmetry = fit.choice().settings.symmetry;
+            assert!(!symmetry.has_half_turn(), "{low}: {symmetry}");
+        }
+    }
+
+    #[test]
+    fn a_plane_that_is_stated_is_taken_and_what_the_data_say_against_it() {
+        let leaning = |l: Direction, v: Direction, normal: f64| {
+            let sum = l.to_vec3()[0] + v.to_vec3()[0];
+            material(l, v, 1.4, 0.0) * (1.0 + 0.3 * sum) * (1.0 + 0.005 * normal)
+        };
+        let samples = samples(700, false, leaning);
+        for (azimuth_deg, is_contradicted) in [(0.0, false), (35.0, true)] {
+            let plane = MirrorPlane::at_deg(azimuth_deg);
+            let fit = ScatteredFit::about_plane(&samples, SymmetryKind::Bilateral, plane).unwrap();
+            let choice = fit.choice();
+            assert_eq!(choice.settings.symmetry, Symmetry::Bilateral(plane));
+            assert_eq!(
+                choice.contradicted_by.is_some(),
+                is_contradicted,
+                "{azimuth_deg}"
             );
         }
     }

@@ -3,7 +3,7 @@
 use crate::Error;
 use gonia_brdf::baselines::{BaselineSettings, UnknownBaseline};
 use gonia_brdf::interpolate::{AnyKernel, FillSettings, Kernel, Matern32, Preset};
-use gonia_brdf::{Grid, MirrorPlane, Symmetry, SymmetryKind};
+use gonia_brdf::{Grid, MirrorPlane, SymmetryKind};
 use gonia_rig::Channels;
 use std::str::FromStr;
 
@@ -198,14 +198,11 @@ impl FillOptions {
     }
 
     /// The symmetry about a plane that is known; `None` of any other.
-    pub(super) fn symmetry_of_plane(&self) -> Option<Symmetry> {
+    pub(super) fn symmetry_of_plane(&self) -> Option<(SymmetryKind, MirrorPlane)> {
         let azimuth = self.plane_deg.filter(|deg| deg.abs() <= 360.0)?;
-        let plane = MirrorPlane::at_deg(azimuth);
-        match self.symmetry? {
-            SymmetryKind::Bilateral => Some(Symmetry::Bilateral(plane)),
-            SymmetryKind::HalfTurnBilateral => Some(Symmetry::HalfTurnBilateral(plane)),
-            _ => None,
-        }
+        let has_plane = [SymmetryKind::Bilateral, SymmetryKind::HalfTurnBilateral];
+        let kind = self.symmetry.filter(|kind| has_plane.contains(kind))?;
+        Some((kind, MirrorPlane::at_deg(azimuth)))
     }
 
     /// Whether something is asked for that only blocks have: few anisotropic samples are filled by them then.

@@ -46,21 +46,15 @@ impl Prepared {
         let mut remarks = warnings::of_oddities(&all.keep_sound());
         let samples = all.three(spread_over(all.channels().count()));
         remarks.extend(warnings::of_samples(&samples)?);
-        // About a plane that is known the samples are completed by their images, however few they are.
-        let known = options.symmetry_of_plane();
-        let fit = match known {
-            Some(_) => None,
-            None => scattered_fit(&samples, grid, options, progress)?,
-        };
-        let (symmetry, reason) = match (&fit, options.symmetry) {
-            (None, _) if known.is_some() => (known.unwrap_or(Symmetry::None), Reason::Asked),
-            (Some(fit), _) => (fit.choice().settings.symmetry, fit.choice().reason),
-            (None, Some(asked)) => {
-                let (symmetry, said) = symmetry_of_many(&samples, asked);
+        let fit = scattered_fit(&samples, grid, options, progress)?;
+        let (symmetry, reason) = match &fit {
+            Some(fit) => (fit.choice().settings.symmetry, fit.choice().reason),
+            None if options.symmetry.is_some() => {
+                let (symmetry, said) = symmetry_of_many(&samples, options);
                 remarks.extend(said);
                 (symmetry, Reason::Asked)
             }
-            (None, None) => (Symmetry::None, Reason::Untested),
+            None => (Symmetry::None, Reason::Untested),
         };
         let fit = fit.filter(|fit| {
             let is_few = fit.places() <= FEW_ANISOTROPIC && !options.asks_for_blocks();
@@ -108,8 +102,10 @@ impl Prepared {
         let mut facts = of_this_program();
         facts.insert("interpolation".into(), settings.to_owned());
         facts.insert("symmetry".into(), self.symmetry.clone());
-        // A fit of the samples as they are: with their file and this it can be made again.
-        if self.fit.is_some() && self.are_few {
+        // A fit of the samples as they are: with their file and this it can be made again, but for a plane that was
+        // stated.
+        let is_stated = options.symmetry_of_plane().is_some();
+        if self.fit.is_some() && self.are_few && !is_stated {
             let symmetry = fit_symmetry(options.symmetry).to_owned();
             facts.insert(FIT_SYMMETRY.into(), symmetry);
         }

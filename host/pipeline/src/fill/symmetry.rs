@@ -22,7 +22,7 @@ pub(super) fn scattered_fit(
     }
     step(progress, Step::ChoosingSettings, |_| {
         Ok(if is_few(samples) {
-            ScatteredFit::new(samples, asked)
+            fit_about(samples, options)
         } else if asked == Some(SymmetryKind::Isotropic) {
             ScatteredFit::new(&few_of(samples, grid), asked)
         } else {
@@ -43,15 +43,29 @@ pub(super) fn fit_of_others(fit: &ScatteredFit, samples: &[Sample], grid: Grid) 
 /// So many of many samples, at most, are looked at for a plane of symmetry, and for what contradicts it.
 const LOOKED_AT: usize = 6000;
 
-/// The symmetry of many samples that is asked for, with the plane that some of them show, and what these say against
-/// it.
-pub(super) fn symmetry_of_many(samples: &[Sample], asked: SymmetryKind) -> (Symmetry, Vec<Remark>) {
-    if matches!(asked, SymmetryKind::None | SymmetryKind::Isotropic) {
+/// The fit of samples with the symmetry that is asked for, about its plane where that is known.
+fn fit_about(samples: &[Sample], options: &FillOptions) -> Option<ScatteredFit> {
+    match options.symmetry_of_plane() {
+        Some((kind, plane)) => ScatteredFit::about_plane(samples, kind, plane),
+        None => ScatteredFit::new(samples, options.symmetry),
+    }
+}
+
+/// The symmetry of many samples that is asked for, with the plane that is known or that some of them show, and what
+/// these say against it.
+pub(super) fn symmetry_of_many(
+    samples: &[Sample],
+    options: &FillOptions,
+) -> (Symmetry, Vec<Remark>) {
+    if matches!(
+        options.symmetry,
+        None | Some(SymmetryKind::None | SymmetryKind::Isotropic)
+    ) {
         return (Symmetry::None, Vec::new());
     }
     let step = samples.len().div_ceil(LOOKED_AT).max(1);
     let some: Vec<Sample> = samples.iter().step_by(step).copied().collect();
-    match ScatteredFit::new(&some, Some(asked)) {
+    match fit_about(&some, options) {
         Some(fit) => (
             fit.choice().settings.symmetry,
             warnings::remarks_on_symmetry(&fit),
