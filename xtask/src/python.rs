@@ -5,11 +5,15 @@ use anyhow::Result;
 use std::process::Command;
 
 /// What builds and tests it, at the versions that it was tried with.
-const PACKAGES: [&str; 4] = [
+const PACKAGES: [&str; 8] = [
     "maturin==1.16.0",
     "pytest==9.2.0",
     "numpy==2.4.6",
     "xarray==2026.9.0",
+    "zarr==3.1.6",
+    "dask==2026.8.0",
+    "distributed==2026.8.0",
+    "dask-jobqueue==0.9.0",
 ];
 
 /// Builds the package in the profile of the tests, and runs its tests beside the command's.

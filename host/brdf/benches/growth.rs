@@ -1,14 +1,14 @@
 //! Time and memory of binning and filling, against the number of samples, threads, and the grid's step.
 //!
 //! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
-//! peak of memory counts from when the samples are there. `-- --fine` adds the grid of 1°, row by row and
-//! without writing it (some three CPU-minutes).
+//! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
+//! `cargo xtask figures fill-fine` measures that.
 
 #![allow(clippy::expect_used)]
 
 mod plan;
 
-use gonia_brdf::interpolate::{ByRows, Data, FillSettings, fill, select};
+use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
 use gonia_brdf::progress::silent;
 use gonia_brdf::{Bins, Grid};
 use plan::{cpu_seconds, material, measure};
@@ -27,9 +27,6 @@ const ROWS: [Row; 6] = [
     (ALL, 1, 2.0),
     (ALL, 2, 4.0),
 ];
-const FINE: Row = (ALL, 2, 1.0);
-/// A grid of more cells than this is filled row by row, as `gonia fill` does.
-const CELLS_IN_MEMORY: usize = 150_000_000;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -41,8 +38,7 @@ fn main() {
         "| samples | bins | step | threads | binning, CPU-s | sorting and choosing, CPU-s | fill, CPU-s | all, CPU-s | wall, s | peak, MB |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let fine = arguments.iter().any(|a| a == "--fine").then_some(FINE);
-    for (samples, threads, step) in ROWS.into_iter().chain(fine) {
+    for (samples, threads, step) in ROWS {
         let program = std::env::current_exe().expect("this program");
         let status = Command::new(program)
             .args(["--row", &samples.to_string(), &step.to_string()])
@@ -82,20 +78,7 @@ fn measure_row(samples: usize, step: f64) {
     };
     let settings = select(&data, settings).settings;
     let choosing = lap();
-    if grid.n_cells() > CELLS_IN_MEMORY {
-        let rows = ByRows::new(&data, &settings, &silent).expect("enough bins");
-        rows.each_row(
-            &silent,
-            &|_, row| match row[0][0] {
-                value if value > 0.0 => Ok(()),
-                value => Err(value),
-            },
-            || f32::NAN,
-        )
-        .expect("positive values");
-    } else {
-        drop(fill(&data, &settings, &silent).expect("enough bins"));
-    }
+    drop(fill(&data, &settings, &silent).expect("enough bins"));
     let filling = lap();
     println!(
         "| {count} | {} | {step}° | {} | {binning:.1} | {choosing:.1} | {filling:.1} | {:.1} | {:.1} | {:.0} |",

@@ -4,7 +4,7 @@ use crate::FileError;
 use crc::{CRC_32_ISCSI, Crc, Digest, Table};
 use gonia_brdf::{DenseBrdf, Grid};
 use gonia_rig::Frame;
-use gonia_rig::{Channels, DenseChannels};
+use gonia_rig::{Channels, DenseChannels, SampleValues};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -55,6 +55,25 @@ fn of_planes<'a>(grid: Grid, planes: impl IntoIterator<Item = &'a Vec<f32>>) -> 
             digest.update(&bytes);
         }
     }
+    text(digest)
+}
+
+/// The checksum of samples: their places, frames and values, in their order.
+pub fn of_samples(samples: &SampleValues) -> String {
+    let mut digest = CRC.digest();
+    let mut of_channel = |channel: usize, with_places: bool| {
+        for sample in samples.of_channels([channel]) {
+            if with_places {
+                let s = &sample;
+                for angle in [s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg] {
+                    digest.update(&angle.to_le_bytes());
+                }
+                digest.update(&s.frame.to_le_bytes());
+            }
+            digest.update(&sample.rgb[0].to_le_bytes());
+        }
+    };
+    (0..samples.channels().count()).for_each(|channel| of_channel(channel, channel == 0));
     text(digest)
 }
 

@@ -12,6 +12,7 @@
 //! | [`export`] | dense BRDFs in other programs' formats |
 //! | [`CaptureFolder`], [`frames_csv`], [`frame_exr`], [`raw_frame`] | a session's frames, raw or as radiance |
 //! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
+//! | [`fill_parts`], [`Scratch`] | what a fill keeps on the disk: one that several processes share, or one of rows |
 //! | [`checksum`] | what ties a note to the file that it was written of |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
@@ -39,8 +40,10 @@ mod exr_colours;
 mod exr_header;
 mod exr_planes;
 mod exr_rows;
+pub mod fill_parts;
 pub mod fit_source;
 pub mod fit_toml;
+mod floats;
 pub mod foreign;
 mod format;
 pub mod frame_exr;
@@ -72,6 +75,7 @@ pub mod samples;
 mod samples_csv;
 mod samples_npy;
 mod samples_npz;
+mod scratch;
 mod summary;
 mod table;
 mod text_fields;
@@ -86,6 +90,7 @@ mod whole_file;
 
 pub use capture_folder::CaptureFolder;
 pub use error::{FileError, one_line};
+pub use scratch::Scratch;
 pub use summary::{
     BinCounts, CellCounts, FileNote, FrameCounts, Pointing, PoseCounts, Refused, Stage, Summary,
 };

@@ -1,5 +1,5 @@
-//! Reads at a place of a file, from several threads at once, on every system; and reads of files whose
-//! length is known.
+//! Reads and writes at a place of a file, from several threads at once, on every system; and reads of files
+//! whose length is known.
 
 use crate::FileError;
 use std::fs::File;
@@ -48,6 +48,35 @@ pub(super) fn read_exact_at(file: &File, mut buffer: &mut [u8], mut offset: u64)
             Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(n) => {
                 buffer = &mut buffer[n..];
+                offset += n as u64;
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Writes a buffer from `offset` on, wherever the file's cursor is.
+///
+/// # Errors
+/// When the system reports one.
+#[cfg(unix)]
+pub(super) fn write_all_at(file: &File, buffer: &[u8], offset: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, buffer, offset)
+}
+
+/// Writes a buffer from `offset` on. The cursor moves, but no write of ours depends on it.
+///
+/// # Errors
+/// When the system reports one.
+#[cfg(windows)]
+pub(super) fn write_all_at(file: &File, mut buffer: &[u8], mut offset: u64) -> io::Result<()> {
+    while !buffer.is_empty() {
+        match std::os::windows::fs::FileExt::seek_write(file, buffer, offset) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(n) => {
+                buffer = &buffer[n..];
                 offset += n as u64;
             }
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}

@@ -142,7 +142,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+pub(crate) fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".gonia-").suffix(".part");
     // tempfile wraps the system's error into one of its own, whose code is lost: it is kept here.

@@ -45,7 +45,7 @@ pub enum Error {
     },
     /// The samples cannot be interpolated.
     #[error(transparent)]
-    Fill(#[from] FillError),
+    Fill(FillError),
     /// Error bars need more frames.
     #[error("too few frames to calibrate error bars: measure more poses, or leave --error out")]
     TooFewFrames,
@@ -99,6 +99,15 @@ pub enum Error {
 impl From<Cancelled> for Error {
     fn from(_: Cancelled) -> Self {
         Error::Cancelled
+    }
+}
+
+impl From<FillError> for Error {
+    fn from(error: FillError) -> Self {
+        match error {
+            FillError::Cancelled => Error::Cancelled,
+            error => Error::Fill(error),
+        }
     }
 }
 

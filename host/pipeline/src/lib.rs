@@ -16,6 +16,7 @@
 //! | [`samples_of_folder`], [`samples_of`] | a capture folder, or any [`FrameSource`](process::FrameSource) | samples, and what became of each frame |
 //! | [`calibrate()`] | a capture folder's frames | the rig's geometry, with uncertainties |
 //! | [`fill()`], [`fill_to_file`], [`fill_bins`] | samples of any channels, or bins | a dense BRDF, with standard errors where asked for |
+//! | [`FillInParts`] | the same | a dense BRDF, by several processes |
 //! | [`FitOfSamples`] | few samples | a fit that is asked anywhere, without a grid |
 //! | [`Behind`] | a dense BRDF whose samples are there | the same fit |
 //! | [`fit`] | a dense BRDF or samples | a model's parameters with uncertainties |
@@ -53,9 +54,9 @@ pub use compare::{CompareError, Options, Side, Table, compare};
 pub use compare_bands::{BandFigures, compare_bands};
 pub use error::Error;
 pub use fill::{
-    Behind, FillAccount, FillCounts, FillMethod, FillOptions, Filled, FilledBins, FitOfSamples,
-    fill, fill_bins, fill_to_file,
+    Begun, Behind, FillAccount, FillCounts, FillInParts, FillMethod, FillOptions, Filled,
+    FilledBins, FitOfSamples, fill, fill_bins, fill_to_file,
 };
 pub use progress::{Cancelled, Progress, Step, silent};
-pub use samples::{samples_of, samples_of_folder, samples_of_sampled};
+pub use samples::{samples_of, samples_of_folder, samples_of_sampled, samples_of_shares};
 pub use warnings::DirectionalAlbedo;

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::budget::{UNCERTAINTIES, budget_of};
 use crate::process::{
     FrameSource, FrameStage, Hidden, Masks, Outcome, ProcessError, Processed, ReferenceCalibration,
-    Sampled, process, process_sampled, rig_check,
+    Sampled, process, process_sampled, process_shared, rig_check,
 };
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
@@ -37,6 +37,21 @@ pub fn samples_of(
 ) -> Result<Processed, Error> {
     watched(rig, source.rows(), progress, |tell| {
         process(rig, source, masks, tell)
+    })
+}
+
+/// As [`samples_of_folder`], of a folder of which other processes have sampled most frames:
+/// [`sample_share`](crate::process::sample_share) gives the shares.
+///
+/// # Errors
+/// As [`samples_of_folder`].
+pub fn samples_of_shares(
+    folder: &CaptureFolder,
+    shares: &[Vec<u8>],
+    progress: &Progress<'_>,
+) -> Result<Processed, Error> {
+    watched(folder.rig(), folder.rows(), progress, |tell| {
+        process_shared(folder.rig(), folder, shares, tell)
     })
 }
 

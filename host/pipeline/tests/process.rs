@@ -459,6 +459,43 @@ fn rows_that_show_the_target_give_the_samples_of_the_whole_frames() {
 }
 
 #[test]
+fn frames_that_are_sampled_by_shares_give_what_one_process_gives() {
+    let (mut source, rig) = lambertian(300);
+    // A light's head in the way, a material without a reference, and frames that cannot be used.
+    source.add(Role::Reference, [75.0, 165.0, 75.0, 345.0]);
+    source.add(Role::Material, [75.0, 165.0, 75.0, 345.0]);
+    source.add(Role::Material, [75.0, 100.0, 0.0, 0.0]);
+    source.add(Role::Reference, BLIND);
+    source.add(Role::Material, BLIND);
+    source.add(Role::Reference, UNREADABLE);
+    source.add(Role::Material, UNREADABLE);
+    let going = |_, _| ControlFlow::Continue(());
+    let whole = process(&rig, &source, &Masks::default(), &going).unwrap();
+    assert!(!whole.remarks.is_empty());
+    let n = source.rows.len();
+    let mut shares: Vec<Vec<u8>> = [0..5, 5..n, n..n + 3]
+        .map(|rows| sample_share(&rig, &source, rows).unwrap())
+        .into();
+    let counted = ByRows {
+        rendered: &source,
+        given: AtomicUsize::new(0),
+        whole: AtomicUsize::new(0),
+    };
+    let shared = process_shared(&rig, &counted, &shares, &going).unwrap();
+    assert_eq!(shared.samples, whole.samples);
+    assert_eq!(shared.frames, whole.frames);
+    assert_eq!(shared.remarks, whole.remarks);
+    assert_eq!(shared.left_out, whole.left_out);
+    // Only what cannot be read, and a frame whose reference is refused, was looked at here.
+    assert_eq!(counted.whole.into_inner(), 3);
+    // A share that is cut, or missing, is made up for.
+    shares[1].truncate(30_000);
+    shares.remove(0);
+    let shared = process_shared(&rig, &source, &shares, &going).unwrap();
+    assert_eq!(shared.samples, whole.samples);
+}
+
+#[test]
 fn masks_of_a_references_frames_serve_a_material_without_them() {
     let mut scene = Scene::of_fabric(400);
     scene.beam = None;

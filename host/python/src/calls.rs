@@ -15,12 +15,13 @@ use gonia_formats::{CaptureFolder, FileError};
 use gonia_pipeline::budget::{budget_in, combine_errors};
 use gonia_pipeline::export::{ExportSource, export as export_file};
 use gonia_pipeline::fit::{cells_of_dense, cells_of_samples, fit_model};
+use gonia_pipeline::process::Processed;
 use gonia_pipeline::{
     Error, FillOptions, FitOfSamples, Options, Side, Table, calibrate as calibrate_rig, colours_of,
     compare as compare_tables, fill as fill_samples, samples_of_folder,
 };
 use gonia_render::{Light, Picture, Tabulated};
-use gonia_rig::{DenseChannels, DenseFile, SampleValues, Scale};
+use gonia_rig::{DenseChannels, DenseFile, Rig, SampleValues, Scale};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -39,7 +40,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(set_threads, module)?)
 }
 
-fn texts(remarks: &[gonia_rig::Remark]) -> Vec<String> {
+pub(crate) fn texts(remarks: &[gonia_rig::Remark]) -> Vec<String> {
     remarks.iter().map(ToString::to_string).collect()
 }
 
@@ -50,14 +51,19 @@ fn process(py: Python<'_>, folder: PathBuf, progress: Option<Py<PyAny>>) -> PyRe
         let rig = CaptureFolder::open(&folder)?.rig().clone();
         Ok::<_, Error>((samples_of_folder(&folder, progress)?, rig))
     })?;
+    Ok(samples_of(processed, &rig, &folder))
+}
+
+/// Samples of a folder's frames, with where they are from.
+pub(crate) fn samples_of(processed: Processed, rig: &Rig, folder: &Path) -> Samples {
     let facts = [("frames".to_owned(), folder.display().to_string())];
-    let note = processed.note(&rig, facts.into());
-    Ok(Samples {
+    let note = processed.note(rig, facts.into());
+    Samples {
         remarks: texts(&processed.remarks),
         values: SampleValues::Rgb(processed.samples),
         scale: note.scale,
         provenance: note.provenance,
-    })
+    }
 }
 
 /// The rig of a capture folder as its frames show it: every number with its uncertainty, and the rig written where
@@ -100,7 +106,7 @@ fn calibrate<'py>(
 
 /// How a grid is filled, as Python says it.
 #[derive(FromPyObject)]
-struct Filling {
+pub(crate) struct Filling {
     #[pyo3(item)]
     step: f64,
     #[pyo3(item)]
@@ -114,7 +120,7 @@ struct Filling {
 }
 
 impl Filling {
-    fn options(&self) -> PyResult<FillOptions> {
+    pub(crate) fn options(&self) -> PyResult<FillOptions> {
         let preset = match self.preset.as_str() {
             "preview" => Preset::Preview,
             "fast" => Preset::Fast,

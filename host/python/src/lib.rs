@@ -6,12 +6,14 @@
 //! | `arrays` | numbers from and to numpy |
 //! | `samples`, `dense` | the two kinds of data |
 //! | `calls` | what is done with them |
+//! | `shared` | the same by several processes |
 
 mod arrays;
 mod calls;
 mod dense;
 mod run;
 mod samples;
+mod shared;
 
 use pyo3::prelude::*;
 
@@ -34,5 +36,6 @@ fn _gonia(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<samples::Samples>()?;
     module.add_class::<dense::Dense>()?;
+    shared::add_to(module)?;
     calls::add_to(module)
 }

@@ -209,11 +209,17 @@ def test_xarray_has_names_units_and_uncertainty(dense):
     assert data.u.shape == data.brdf.shape and "samples" not in data.brdf.attrs
 
 
-def test_the_books_page_runs(capsys, recwarn):
-    page = pathlib.Path(__file__).parents[3] / "docs/src/guides/python.md"
+def run_page(name):
+    """Runs the Python of a page of the book; the names that it has given."""
+    page = pathlib.Path(__file__).parents[3] / "docs/src/guides" / name
     blocks = page.read_text(encoding="utf-8").split("```python\n")[1:]
     program = "\n".join(block.split("```")[0] for block in blocks)
     names = {}
     exec(compile(program, str(page), "exec"), names)
+    return names
+
+
+def test_the_books_page_runs(capsys, recwarn):
+    names = run_page("python.md")
     assert names["values"].shape == (1, 3) and names["picture"].shape == (64, 64, 3)
     assert "gonia.Dense" in capsys.readouterr().out

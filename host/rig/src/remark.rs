@@ -16,6 +16,11 @@ impl Remark {
     ) -> Self {
         Self(format!("{place}: {what}; {remedy}"))
     }
+
+    /// One that was made elsewhere, as the line that it is.
+    pub fn of_line(line: &str) -> Self {
+        Self(line.to_owned())
+    }
 }
 
 impl fmt::Display for Remark {

@@ -225,7 +225,7 @@ fn median(values: &mut [f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::record::tests::some_frame;
+    use crate::session::some_frame::some_frame;
     use gonia_rig::Role;
 
     fn frame(value: impl Fn(usize) -> f32) -> SampledFrame {

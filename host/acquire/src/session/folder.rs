@@ -1,15 +1,15 @@
 //! A session's folder as it is read.
 
 use crate::session::entry::{Entry, PoseDone, SessionEnd};
+use crate::session::journal;
 use crate::session::journal::Lines;
 use crate::session::provenance::SessionProvenance;
 use crate::session::state::SessionState;
-use crate::session::{journal, record};
 use gonia_brdf::Pose;
 use gonia_formats::plan_csv::read_plan_csv;
 use gonia_formats::rig_toml::read_rig;
 use gonia_formats::{FileError, checksum};
-use gonia_pipeline::process::{Outcome, SampledFrame};
+use gonia_pipeline::process::{Outcome, SampledFrame, sampled_bytes};
 use gonia_protocol::crc32c;
 use gonia_rig::{FrameRow, Reflectance, Rig, Role};
 use std::fs::File;
@@ -190,7 +190,8 @@ impl SessionFolder {
         file.seek(SeekFrom::Start(at))
             .and_then(|_| file.read_to_end(&mut tail))
             .map_err(|error| FileError::reading(&path, &error))?;
-        let second = record::split_first(&tail).and_then(|(_, rest)| record::split_first(rest));
+        let second = sampled_bytes::split_first(&tail)
+            .and_then(|(_, rest)| sampled_bytes::split_first(rest));
         if second.is_none() {
             return Ok(());
         }
@@ -237,7 +238,8 @@ impl SessionFolder {
         if crc32c(&bytes) != pose.crc {
             return Err(damaged("is damaged: the frame's checksum is wrong"));
         }
-        let frame = record::from_bytes(&bytes).ok_or_else(|| damaged("holds no frame there"))?;
+        let frame =
+            sampled_bytes::from_bytes(&bytes).ok_or_else(|| damaged("holds no frame there"))?;
         if (frame.report.role, frame.report.frame as usize) != (pose.role, pose.index) {
             return Err(damaged("holds another frame there"));
         }

@@ -5,7 +5,7 @@
 //! | `rig.toml`, `plan.csv` | the rig and the poses, as the session began with them | whole |
 //! | `provenance.toml` | versions, controllers and their settings' checksums, camera, seed | whole |
 //! | `journal.log` | start, pose, event, stop: a line each ([`Entry`]), checksummed | appended, synced a line |
-//! | `frames.bin` | what each frame showed at the grid points ([`record`]) | appended, synced a frame |
+//! | `frames.bin` | what each frame showed at the grid points ([`sampled_bytes`](gonia_pipeline::process::sampled_bytes)) | appended, synced a frame |
 //! | `lock` | held while a capture runs | – |
 //!
 //! A pose is done when its line is in the journal, and its line is written after its frame is on the
@@ -19,10 +19,11 @@ mod entry;
 mod folder;
 mod journal;
 mod provenance;
-pub mod record;
 mod samples;
 #[cfg(test)]
 mod simulation;
+#[cfg(test)]
+mod some_frame;
 mod state;
 mod verify;
 mod writer;

@@ -8,7 +8,7 @@
 use super::append::LogFile;
 use super::entry::{CHANGE_THE_SAMPLE, Entry, GivenUp, PoseDone, SessionEnd};
 use super::folder::{FRAMES, JOURNAL};
-use super::record::{self, tests::some_frame};
+use super::some_frame::some_frame;
 use super::state::SessionState;
 use super::writer::SessionWriter;
 use super::{ControlComparison, journal};
@@ -16,7 +16,7 @@ use crate::capture::{AfterControl, Step, after_control, judged, next_step};
 use gonia_brdf::random::Random;
 use gonia_formats::FileError;
 use gonia_imaging::RegistrationFailure;
-use gonia_pipeline::process::{Outcome, SampledFrame};
+use gonia_pipeline::process::{Outcome, SampledFrame, sampled_bytes};
 use gonia_protocol::crc32c;
 use gonia_rig::Role;
 use std::collections::VecDeque;
@@ -297,7 +297,7 @@ impl World {
         let end = (pose.at + pose.bytes) as usize;
         let bytes = &disk.files[1].cached[pose.at as usize..end];
         assert_eq!(crc32c(bytes), pose.crc);
-        let frame = record::from_bytes(bytes).unwrap();
+        let frame = sampled_bytes::from_bytes(bytes).unwrap();
         assert_eq!(frame.report.frame as usize, pose.index);
         assert_eq!(frame.report.role, pose.role);
         frame

@@ -184,7 +184,7 @@ fn check_kept_frames(session: &SessionFolder, findings: &mut Vec<Finding>) {
 mod tests {
     use super::*;
     use crate::session::folder::PROVENANCE;
-    use crate::session::record::tests::some_frame;
+    use crate::session::some_frame::some_frame;
     use crate::session::writer::tests::begin;
     use gonia_rig::Role;
 

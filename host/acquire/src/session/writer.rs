@@ -1,6 +1,7 @@
 //! A session's folder as it is written: by one program at a time.
 
 use crate::session::append::{AppendLog, LogFile};
+use crate::session::clock;
 use crate::session::entry::{Entry, PoseDone};
 use crate::session::folder::{
     CALIBRATION, CALIBRATION_FIGURE, FRAMES, JOURNAL, PLAN, PROVENANCE, RIG, SessionFolder,
@@ -8,11 +9,10 @@ use crate::session::folder::{
 use crate::session::journal::{Journal, Lines};
 use crate::session::provenance::SessionProvenance;
 use crate::session::state::{Contradiction, SessionState};
-use crate::session::{clock, record};
 use gonia_brdf::Pose;
 use gonia_formats::plan_csv::write_plan_csv;
 use gonia_formats::{FileError, check_writable, checksum, write_whole_bytes};
-use gonia_pipeline::process::{Outcome, SampledFrame};
+use gonia_pipeline::process::{Outcome, SampledFrame, sampled_bytes};
 use gonia_protocol::crc32c;
 use std::fs::{File, OpenOptions};
 use std::path::{Component, Path, PathBuf};
@@ -187,7 +187,7 @@ impl SessionWriter {
     /// When the disk does not take it, or the pose is done already. The session on the disk is then as it
     /// was before.
     pub fn keep(&mut self, frame: &SampledFrame, pointing_deg: f64) -> Result<PoseDone, FileError> {
-        let bytes = record::to_bytes(frame);
+        let bytes = sampled_bytes::to_bytes(frame);
         let at = self.frames.length();
         let done = PoseDone {
             role: frame.report.role,
@@ -335,7 +335,7 @@ pub(super) mod tests {
     use super::*;
     use crate::session::entry::SessionEnd;
     use crate::session::provenance::ControllerIdentity;
-    use crate::session::record::tests::some_frame;
+    use crate::session::some_frame::some_frame;
     use gonia_brdf::Direction;
     use gonia_rig::{Rig, Role};
 

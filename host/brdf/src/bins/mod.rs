@@ -99,6 +99,32 @@ impl<const N: usize> Bins<N> {
         }
     }
 
+    /// As they were once: of a grid, with how many samples were outside, and the variance of a sample's logarithm.
+    /// `None` where the bins are none of this grid in ascending order, or have no number where one must be.
+    pub fn from_parts(
+        grid: Grid,
+        bins: Vec<Bin<N>>,
+        outside: usize,
+        noise_variance: Option<f32>,
+    ) -> Option<Self> {
+        let is_sound = |bin: &Bin<N>| {
+            let floats = bin.median.iter().chain(&bin.mad);
+            (bin.cell as usize) < grid.n_cells()
+                && bin.count > 0
+                && floats
+                    .chain(&bin.light)
+                    .chain(&bin.view)
+                    .all(|v| v.is_finite())
+        };
+        let ascending = bins.is_sorted_by(|a, b| a.cell < b.cell);
+        (ascending && bins.iter().all(is_sound)).then_some(Self {
+            grid,
+            bins,
+            outside,
+            noise_variance,
+        })
+    }
+
     /// The grid.
     pub fn grid(&self) -> Grid {
         self.grid

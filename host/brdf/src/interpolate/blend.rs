@@ -11,15 +11,21 @@ use super::patches::{Cover, Patch};
 use crate::quantile::median;
 use rayon::prelude::*;
 
+/// What the pairs of one patch with itself and all later ones give at their corners.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AtCorners<const N: usize = 3> {
+    /// Logarithms, pair by pair: corner by corner of the first patch, corner by corner of the second.
+    pub values: Vec<[f32; N]>,
+    /// Of each pair, whether its cells follow from its corners.
+    pub smooth: Vec<bool>,
+}
+
 /// Logarithms at the corners of all pairs of patches, and their means over the pairs that meet.
 pub struct Corners<const N: usize = 3> {
     /// Places of the patches' corners: where those of each patch begin, and the end of the last.
     starts: Vec<usize>,
-    /// For each patch, the values of its pairs with itself and all later patches: corner by corner of
-    /// the first, corner by corner of the second.
-    values: Vec<Vec<[f32; N]>>,
-    /// Of the same pairs, whether their cells follow from their corners.
-    smooth: Vec<Vec<bool>>,
+    /// By patch.
+    of_patches: Vec<AtCorners<N>>,
     /// Means by pair of corners (v, w), v ≤ w: row v begins at `v n − v (v + 1) / 2`.
     means: Vec<[f32; N]>,
     /// Number of corners.
@@ -29,10 +35,8 @@ pub struct Corners<const N: usize = 3> {
 }
 
 impl<const N: usize> Corners<N> {
-    /// Averages. `values`: for each patch, what its pairs with itself and all later ones give at
-    /// their corners, and whether their cells follow from these.
-    pub fn new(cover: &Cover, values: Vec<(Vec<[f32; N]>, Vec<bool>)>, least_limit: f32) -> Self {
-        let (values, smooth) = values.into_iter().unzip();
+    /// Averages what all patches of a cover give, in their order.
+    pub fn new(cover: &Cover, of_patches: Vec<AtCorners<N>>, least_limit: f32) -> Self {
         let mut starts = vec![0];
         for (k, patch) in cover.patches.iter().enumerate() {
             starts.push(starts[k] + patch.corners.len());
@@ -40,8 +44,7 @@ impl<const N: usize> Corners<N> {
         let n = cover.corners.len();
         let mut corners = Self {
             starts,
-            values,
-            smooth,
+            of_patches,
             means: Vec::new(),
             n,
             limit: 0.0,
@@ -113,7 +116,7 @@ impl<const N: usize> Corners<N> {
     fn of_pair(&self, p: usize, q: usize) -> &[[f32; N]] {
         let height = self.starts[p + 1] - self.starts[p];
         let from = height * (self.starts[q] - self.starts[p]);
-        &self.values[p][from..from + height * (self.starts[q + 1] - self.starts[q])]
+        &self.of_patches[p].values[from..from + height * (self.starts[q + 1] - self.starts[q])]
     }
 
     fn mean(&self, v: u32, w: u32) -> [f32; N] {
@@ -123,7 +126,7 @@ impl<const N: usize> Corners<N> {
 
     /// Whether the cells of patches number `p` ≤ `q` follow from their corners.
     pub fn is_smooth(&self, p: usize, q: usize) -> bool {
-        self.smooth[p][q - p]
+        self.of_patches[p].smooth[q - p]
     }
 
     /// Shifts the cells of patches number `p` ≤ `q`, light by light, towards the means; those of a smooth

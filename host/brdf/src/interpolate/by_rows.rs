@@ -1,31 +1,75 @@
-//! A fill row by row, for grids whose cells do not fit memory (1°: a thousand million, 12 GB).
+//! A fill row by row, for grids whose cells do not fit memory (1°: a thousand million, 12 GB), and for several
+//! processes that share one.
 //!
-//! Every pair of patches is solved three times: once for what it says at its corners, and then for the
-//! rows of either patch. The same numbers in the same order give the same bits, so that the result is as
-//! reciprocal as one in memory.
+//! Every pair of patches is solved once. Its cells are kept elsewhere ([`KeptCells`]: on a disk) until what all
+//! pairs give at their corners is known; then they are shifted to it, and written into the rows of either
+//! patch. The same numbers in the same order give the same bits, so that the result is as reciprocal as one
+//! in memory, and the same.
 
 use super::FillSettings;
-use super::blend::{Corners, Shifts};
+use super::blend::{AtCorners, Corners, Shifts};
 use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::exponential::exponentials;
 use super::fill::{FillError, Task};
-use super::refine::Refiner;
+use super::patches::{Patch, cover};
+use super::refine::Solved;
+use crate::grid::Grid;
 use crate::progress::Progress;
 use pulp::Arch;
 use rayon::prelude::*;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A fill of which the rows are still to be made.
 pub struct ByRows<'a, const N: usize = 3> {
     task: Task<'a, N>,
-    corners: Corners<N>,
 }
+
+/// Keeps the logarithms of cells from the solving of their pairs to the writing of their rows: by patch, those of its
+/// pairs with itself and all later ones that do not follow from their corners.
+pub trait KeptCells<const N: usize>: Sync {
+    /// Why it cannot.
+    type Error: From<FillError> + Send;
+
+    /// Keeps all that a patch has, and what its pairs give at their corners.
+    ///
+    /// # Errors
+    /// When they cannot be kept.
+    fn put(
+        &self,
+        patch: usize,
+        at_corners: &AtCorners<N>,
+        cells: &[[f32; N]],
+    ) -> Result<(), Self::Error>;
+
+    /// Some of a patch's cells, appended to `into`.
+    ///
+    /// # Errors
+    /// When they cannot be had.
+    fn get(
+        &self,
+        patch: usize,
+        cells: Range<usize>,
+        into: &mut Vec<[f32; N]>,
+    ) -> Result<(), Self::Error>;
+}
+
+/// Neighbouring rings of patches: what writes whole polar angles of the light.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Band {
+    /// Its patches.
+    pub patches: Range<usize>,
+    /// Its polar angles of the light, by their numbers on the grid.
+    pub rings: Range<usize>,
+}
+
+/// Takes a row: its number, and of each channel a value a view.
+pub type TakeRow<'a, const N: usize, E> =
+    &'a (dyn Fn(usize, [&[f32]; N]) -> Result<(), E> + Sync + 'a);
 
 /// Working memory of one thread.
 struct Work<const N: usize> {
-    refiner: Refiner<N>,
     logs: Vec<[f32; N]>,
     shifts: Shifts<N>,
     arch: Arch,
@@ -35,87 +79,167 @@ impl<'a, const N: usize> ByRows<'a, N>
 where
     dyn AnyKernel: NewBlock<N>,
 {
-    /// Solves all pairs of patches once. `progress` is called with the share done, from any thread.
+    /// Divides the grid.
     ///
     /// # Errors
     /// Too few bins.
-    pub fn new(
-        data: &'a Data<'a, N>,
-        settings: &'a FillSettings,
-        progress: &Progress<'_>,
-    ) -> Result<Self, FillError> {
+    pub fn new(data: &'a Data<'a, N>, settings: &'a FillSettings) -> Result<Self, FillError> {
         let task = Task::new(data, settings)?;
-        let corners = task.solve_pairs(false, progress, &|_, _| ())?;
-        Ok(Self { task, corners })
+        Ok(Self { task })
     }
 
-    /// Makes all rows, and gives each (its number, and three channels of a value a view) to `take`, in
-    /// no order and from several threads. A thread holds the rows of one patch.
+    /// How many patches there are.
+    pub fn patches(&self) -> usize {
+        self.task.cover.patches.len()
+    }
+
+    /// Solves the pairs of some patches with themselves and all later ones. `progress` is called with the share
+    /// done, from any thread.
     ///
     /// # Errors
-    /// The first of `take`'s; or `cancelled`'s, when `progress` ends the work.
-    pub fn each_row<E: Send>(
+    /// The first of `kept`'s; cancelled.
+    pub fn solve<K: KeptCells<N>>(
         &self,
+        patches: Vec<usize>,
+        kept: &K,
         progress: &Progress<'_>,
-        take: &(impl Fn(usize, [&[f32]; N]) -> Result<(), E> + Sync),
-        cancelled: impl Fn() -> E + Sync,
-    ) -> Result<(), E> {
-        let grid = self.task.grid;
-        let (n, n_phi) = (grid.n_directions(), grid.n_phi());
-        let patches = &self.task.cover.patches;
+    ) -> Result<Vec<AtCorners<N>>, K::Error> {
+        let each = |cells: &mut Vec<[f32; N]>, solved: Solved<'_, N>, _: (&Patch, &Patch)| {
+            if !solved.is_smooth {
+                cells.extend_from_slice(solved.cells);
+            }
+        };
+        let done = |patch, at_corners: &AtCorners<N>, cells: Vec<[f32; N]>| {
+            kept.put(patch, at_corners, &cells)
+        };
+        self.task
+            .solve_pairs(patches, false, progress, &each, &done)
+    }
+
+    /// Whether something may be what the pairs of a patch give at their corners.
+    pub fn is_of_patch(&self, patch: usize, at_corners: &AtCorners<N>) -> bool {
+        let Some(later) = self.task.cover.patches.get(patch..) else {
+            return false;
+        };
+        let of_later: usize = later.iter().map(|q| q.corners.len()).sum();
+        let here = later.first().map_or(0, |p| p.corners.len());
+        at_corners.smooth.len() == later.len() && at_corners.values.len() == here * of_later
+    }
+
+    /// Averages at the corners, of all patches in their order, each [as it must be](Self::is_of_patch).
+    pub fn corners(&self, of_patches: Vec<AtCorners<N>>) -> Corners<N> {
+        self.task.corners(of_patches)
+    }
+
+    /// Makes all rows of lights in some patches, and gives each to `take`, in no order and from several threads.
+    /// A thread holds the rows of one patch.
+    ///
+    /// # Errors
+    /// The first of `take`'s or `kept`'s; cancelled.
+    pub fn each_row<K: KeptCells<N>>(
+        &self,
+        patches: Range<usize>,
+        corners: &Corners<N>,
+        kept: &K,
+        progress: &Progress<'_>,
+        take: TakeRow<'_, N, K::Error>,
+    ) -> Result<(), K::Error> {
+        let count = patches.len();
+        let places = self.places(corners);
         let done = AtomicUsize::new(0);
         let work = || Work {
-            refiner: Refiner::new(self.task.settings),
             logs: Vec::new(),
             shifts: Shifts::default(),
             arch: Arch::new(),
         };
-        (0..patches.len())
+        patches
             .into_par_iter()
             .with_max_len(1)
             .try_for_each_init(work, |work, p| {
-                let lights = &patches[p].directions;
-                let mut rows: [Vec<f32>; N] =
-                    std::array::from_fn(|_| vec![0.0f32; lights.len() * n]);
-                for q in 0..patches.len() {
-                    self.write_pair(work, p, q, &mut rows);
-                }
-                for (k, light) in lights.iter().enumerate() {
-                    let mut row = rows.each_mut().map(|plane| &mut plane[k * n..(k + 1) * n]);
-                    // The pole's value, computed at azimuth 0, is that of all azimuths.
-                    for plane in &mut row {
-                        let pole = plane[0];
-                        plane[1..n_phi].fill(pole);
-                    }
-                    let row = row.map(|plane| &*plane);
-                    let copies = if *light == 0 { n_phi } else { 1 };
-                    for azimuth in 0..copies {
-                        take(*light as usize + azimuth, row)?;
-                    }
-                }
-                match progress((done.fetch_add(1, Relaxed) + 1) as f64 / patches.len() as f64) {
+                self.rows_of_patch(work, p, corners, &places, kept, take)?;
+                match progress((done.fetch_add(1, Relaxed) + 1) as f64 / count as f64) {
                     ControlFlow::Continue(()) => Ok(()),
-                    ControlFlow::Break(()) => Err(cancelled()),
+                    ControlFlow::Break(()) => Err(FillError::Cancelled.into()),
                 }
             })
     }
 
-    /// Writes the cells of lights in patch `p` and views in patch `q`.
-    fn write_pair(&self, work: &mut Work<N>, p: usize, q: usize, rows: &mut [Vec<f32>; N]) {
+    /// Where among the kept cells of each patch those of its pairs begin.
+    fn places(&self, corners: &Corners<N>) -> Vec<Vec<usize>> {
         let patches = &self.task.cover.patches;
-        let (settings, n) = (self.task.settings, self.task.grid.n_directions());
+        let of_patch = |p: usize| {
+            let mut place = 0;
+            let of_pair = |q: usize| {
+                let here = place;
+                if !corners.is_smooth(p, q) {
+                    place += patches[p].directions.len() * patches[q].directions.len();
+                }
+                here
+            };
+            (p..patches.len()).map(of_pair).collect()
+        };
+        (0..patches.len()).map(of_patch).collect()
+    }
+
+    fn rows_of_patch<K: KeptCells<N>>(
+        &self,
+        work: &mut Work<N>,
+        p: usize,
+        corners: &Corners<N>,
+        places: &[Vec<usize>],
+        kept: &K,
+        take: TakeRow<'_, N, K::Error>,
+    ) -> Result<(), K::Error> {
+        let patches = &self.task.cover.patches;
+        let (n, n_phi) = (self.task.grid.n_directions(), self.task.grid.n_phi());
+        let lights = &patches[p].directions;
+        let mut rows: [Vec<f32>; N] = std::array::from_fn(|_| vec![0.0f32; lights.len() * n]);
+        for q in 0..patches.len() {
+            let (first, second) = (p.min(q), p.max(q));
+            work.logs.clear();
+            if !corners.is_smooth(first, second) {
+                let from = places[first][second - first];
+                let count = patches[first].directions.len() * patches[second].directions.len();
+                kept.get(first, from..from + count, &mut work.logs)?;
+            }
+            self.write_pair(work, (p, q), corners, &mut rows);
+        }
+        for (k, light) in lights.iter().enumerate() {
+            let mut row = rows.each_mut().map(|plane| &mut plane[k * n..(k + 1) * n]);
+            // The pole's value, computed at azimuth 0, is that of all azimuths.
+            for plane in &mut row {
+                let pole = plane[0];
+                plane[1..n_phi].fill(pole);
+            }
+            let row = row.map(|plane| &*plane);
+            let copies = if *light == 0 { n_phi } else { 1 };
+            for azimuth in 0..copies {
+                take(*light as usize + azimuth, row)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the cells of lights in patch `p` and views in patch `q`, of which the logarithms are there unless they
+    /// follow from their corners.
+    fn write_pair(
+        &self,
+        work: &mut Work<N>,
+        (p, q): (usize, usize),
+        corners: &Corners<N>,
+        rows: &mut [Vec<f32>; N],
+    ) {
+        let patches = &self.task.cover.patches;
+        let n = self.task.grid.n_directions();
         let (first, second) = (p.min(q), p.max(q));
-        let pair = (&patches[first], &patches[second]);
-        let solved = work
-            .refiner
-            .solve(self.task.hierarchy(), settings, pair, false);
-        work.logs.clear();
-        work.logs.extend_from_slice(solved.cells);
-        let numbers = (first, second);
-        self.corners
-            .blend(&self.task.cover, numbers, &mut work.logs, &mut work.shifts);
+        corners.blend(
+            &self.task.cover,
+            (first, second),
+            &mut work.logs,
+            &mut work.shifts,
+        );
         exponentials(work.arch, &mut work.logs);
-        let width = pair.1.directions.len();
+        let width = patches[second].directions.len();
         for a in 0..patches[p].directions.len() {
             for (b, view) in patches[q].directions.iter().enumerate() {
                 // Within one patch the first order of a pair serves for both, as in memory.
@@ -129,15 +253,40 @@ where
     }
 }
 
+/// The bands of a grid with some settings, from the pole on: together all patches and all polar angles, each once.
+pub fn bands(grid: Grid, settings: &FillSettings) -> Vec<Band> {
+    let (patches, n_phi) = (
+        cover(grid, &settings.patch_sizes_deg()).patches,
+        grid.n_phi(),
+    );
+    // Patches come ring by ring of patches, each from its first polar angle to its last.
+    let rings = |patch: &Patch| {
+        let ring = |d: Option<&u32>| d.map_or(0, |d| *d as usize / n_phi);
+        ring(patch.directions.first())..ring(patch.directions.last()) + 1
+    };
+    let mut bands: Vec<Band> = Vec::new();
+    for (number, patch) in patches.iter().enumerate() {
+        let rings = rings(patch);
+        match bands.last_mut() {
+            Some(band) if band.rings == rings => band.patches.end = number + 1,
+            _ => bands.push(Band {
+                patches: number..number + 1,
+                rings,
+            }),
+        }
+    }
+    bands
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::fill;
     use super::*;
     use crate::bins::Bins;
-    use crate::grid::Grid;
     use crate::model::{Brdf, Kurt};
     use crate::progress::silent;
     use crate::sample::Sample;
+    use std::collections::BTreeMap;
     use std::sync::Mutex;
 
     #[test]
@@ -175,20 +324,65 @@ mod tests {
         let dense = fill(&data, &settings, &silent).unwrap();
         let n = grid.n_directions();
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
-        ByRows::new(&data, &settings, &silent)
-            .unwrap()
-            .each_row(
-                &silent,
-                &|light, row| {
-                    let mut planes = planes.lock().map_err(|_| ())?;
-                    for c in 0..3 {
-                        planes[c][light * n..(light + 1) * n].copy_from_slice(row[c]);
-                    }
-                    Ok::<(), ()>(())
-                },
-                || (),
-            )
-            .unwrap();
+        let (rows, kept) = (ByRows::new(&data, &settings).unwrap(), InMemory::default());
+        let half = rows.patches() / 2;
+        // Two that solve, and then one a band that writes.
+        let mut solved = rows.solve((0..half).collect(), &kept, &silent).unwrap();
+        let others = rows.solve((half..rows.patches()).collect(), &kept, &silent);
+        solved.extend(others.unwrap());
+        let solved_right = |(p, of)| rows.is_of_patch(p, of);
+        assert!(solved.iter().enumerate().all(solved_right));
+        assert!(!rows.is_of_patch(1, &solved[0]));
+        let corners = rows.corners(solved);
+        for band in bands(grid, &settings) {
+            let take = |light: usize, row: [&[f32]; 3]| {
+                assert!(band.rings.contains(&(light / grid.n_phi())));
+                let mut planes = planes.lock().unwrap();
+                for c in 0..3 {
+                    planes[c][light * n..(light + 1) * n].copy_from_slice(row[c]);
+                }
+                Ok(())
+            };
+            rows.each_row(band.patches.clone(), &corners, &kept, &silent, &take)
+                .unwrap();
+        }
         assert_eq!(dense.planes(), &planes.into_inner().unwrap());
+        let cells: usize = kept.0.into_inner().unwrap().values().map(Vec::len).sum();
+        assert!(cells > 0 && cells < n * n / 2, "{cells} of {}", n * n);
+    }
+
+    #[derive(Default)]
+    struct InMemory(Mutex<BTreeMap<usize, Vec<[f32; 3]>>>);
+
+    impl KeptCells<3> for InMemory {
+        type Error = FillError;
+
+        fn put(&self, patch: usize, _: &AtCorners, cells: &[[f32; 3]]) -> Result<(), FillError> {
+            self.0.lock().unwrap().insert(patch, cells.to_vec());
+            Ok(())
+        }
+
+        fn get(
+            &self,
+            patch: usize,
+            cells: Range<usize>,
+            into: &mut Vec<[f32; 3]>,
+        ) -> Result<(), FillError> {
+            into.extend(&self.0.lock().unwrap()[&patch][cells]);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn bands_hold_all_patches_and_all_polar_angles_once() {
+        let grid = Grid::with_step_deg(2.0).unwrap();
+        let settings = FillSettings::DEFAULT;
+        let patches = cover(grid, &settings.patch_sizes_deg()).patches;
+        let (mut patch, mut ring) = (0, 0);
+        for band in bands(grid, &settings) {
+            assert_eq!((band.patches.start, band.rings.start), (patch, ring));
+            (patch, ring) = (band.patches.end, band.rings.end);
+        }
+        assert_eq!((patch, ring), (patches.len(), grid.n_theta()));
     }
 }

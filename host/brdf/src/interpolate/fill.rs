@@ -1,7 +1,7 @@
 //! All cells, block by block.
 
 use super::FillSettings;
-use super::blend::{Corners, Shifts};
+use super::blend::{AtCorners, Corners, Shifts};
 use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::error_bars::{Calibration, ErrorBars};
@@ -90,7 +90,7 @@ where
     let values = SharedPlanes::new(grid.n_cells());
     let errors = SharedPlanes::new(calibration.map_or(0, |_| grid.n_cells()));
     // First the logarithms of the cells of each pair, and their relative errors.
-    let corners = task.solve_pairs(calibration.is_some(), progress, &|solved, (p, q)| {
+    let each = |(): &mut (), solved: Solved<'_, N>, (p, q): (&Patch, &Patch)| {
         if !solved.is_smooth {
             values.store(grid, (p, q), solved.cells);
         }
@@ -107,7 +107,15 @@ where
                 .collect();
             errors.store(grid, (p, q), &relative);
         }
-    })?;
+    };
+    let of_patches = task.solve_pairs(
+        (0..patches.len()).collect(),
+        calibration.is_some(),
+        progress,
+        &each,
+        &|_, _, ()| Ok::<_, FillError>(()),
+    )?;
+    let corners = task.corners(of_patches);
     // Then, shifted to what they agree on with their neighbours, the values.
     (0..patches.len())
         .into_par_iter()
@@ -132,6 +140,9 @@ where
         });
     Ok((values.into_planes(grid), errors.into_planes(grid)))
 }
+
+/// Takes a pair of patches: into what is kept of the first one's, what was solved, and the two.
+type TakePair<'a, const N: usize, K> = &'a (dyn Fn(&mut K, Solved<'_, N>, (&Patch, &Patch)) + Sync);
 
 /// What a fill is made of.
 pub(super) struct Task<'a, const N: usize> {
@@ -169,43 +180,54 @@ where
         self.moved.as_ref().unwrap_or(self.data.hierarchy())
     }
 
-    /// Solves all pairs of patches, gives each to `each`, and averages at their corners.
+    /// Solves the pairs of some patches with themselves and all later ones. Each pair is given to `each`, and
+    /// with the last of a patch's what `each` kept of them to `done`. What they give at their corners is in the
+    /// order of `patches`.
     ///
     /// # Errors
-    /// Cancelled.
-    pub(super) fn solve_pairs(
+    /// Cancelled, and the first of `done`'s.
+    pub(super) fn solve_pairs<K: Default, E: From<FillError> + Send>(
         &self,
+        patches: Vec<usize>,
         with_variances: bool,
         progress: &Progress<'_>,
-        each: &(dyn Fn(Solved<'_, N>, (&Patch, &Patch)) + Sync),
-    ) -> Result<Corners<N>, FillError> {
-        let patches = &self.cover.patches;
-        let pairs = patches.len() * (patches.len() + 1) / 2;
-        let done = AtomicUsize::new(0);
-        let refiner = || Refiner::new(self.settings);
-        let at_corners = (0..patches.len())
+        each: TakePair<'_, N, K>,
+        done: &(dyn Fn(usize, &AtCorners<N>, K) -> Result<(), E> + Sync),
+    ) -> Result<Vec<AtCorners<N>>, E> {
+        let all = &self.cover.patches;
+        let pairs: usize = patches.iter().map(|p| all.len() - p).sum();
+        let solved_pairs = AtomicUsize::new(0);
+        patches
             .into_par_iter()
             // Early patches have the most partners; hand them out one by one.
             .with_max_len(1)
-            .map_init(refiner, |refiner, p| {
-                let (mut at_corners, mut smooth) = (Vec::new(), Vec::new());
-                for q in &patches[p..] {
-                    let pair = (&patches[p], q);
-                    let solved =
-                        refiner.solve(self.hierarchy(), self.settings, pair, with_variances);
-                    at_corners.extend_from_slice(solved.corners);
-                    smooth.push(solved.is_smooth);
-                    each(solved, pair);
-                }
-                let before = done.fetch_add(patches.len() - p, Relaxed);
-                match progress((before + patches.len() - p) as f64 / pairs as f64) {
-                    ControlFlow::Continue(()) => Ok((at_corners, smooth)),
-                    ControlFlow::Break(()) => Err(FillError::Cancelled),
-                }
-            })
-            .collect::<Result<_, _>>()?;
-        let limit = self.settings.blend_limit();
-        Ok(Corners::new(&self.cover, at_corners, limit))
+            .map_init(
+                || Refiner::new(self.settings),
+                |refiner, p| {
+                    let (mut at_corners, mut kept) = (AtCorners::default(), K::default());
+                    for q in &all[p..] {
+                        let pair = (&all[p], q);
+                        let solved =
+                            refiner.solve(self.hierarchy(), self.settings, pair, with_variances);
+                        at_corners.values.extend_from_slice(solved.corners);
+                        at_corners.smooth.push(solved.is_smooth);
+                        each(&mut kept, solved, pair);
+                    }
+                    done(p, &at_corners, kept)?;
+                    let here = all.len() - p;
+                    let before = solved_pairs.fetch_add(here, Relaxed);
+                    match progress((before + here) as f64 / pairs as f64) {
+                        ControlFlow::Continue(()) => Ok(at_corners),
+                        ControlFlow::Break(()) => Err(FillError::Cancelled.into()),
+                    }
+                },
+            )
+            .collect()
+    }
+
+    /// Averages what all pairs of patches give at their corners.
+    pub(super) fn corners(&self, of_patches: Vec<AtCorners<N>>) -> Corners<N> {
+        Corners::new(&self.cover, of_patches, self.settings.blend_limit())
     }
 }
 

@@ -27,8 +27,9 @@ pub(crate) mod planes;
 pub mod refine;
 pub mod select;
 
+pub use blend::{AtCorners, Corners};
 pub use block::kernel::{AnyKernel, Kernel, Matern32, NewBlock, WIDTHS};
-pub use by_rows::ByRows;
+pub use by_rows::{Band, ByRows, KeptCells, bands};
 pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};

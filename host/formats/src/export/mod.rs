@@ -14,10 +14,13 @@ mod pab;
 pub(crate) mod radiance;
 mod utia;
 mod zarr;
+mod zarr_rings;
 pub(crate) mod zemax;
 
+pub(crate) use dataset::{channels_of, scale_of};
 pub use folder::check_new_folder;
 pub use format::{ExportFormat, ExportSettings, Holds, How, Meaning, Resolution};
+pub use zarr_rings::ZarrRings;
 
 use crate::{FileError, rgl, table};
 use std::path::Path;

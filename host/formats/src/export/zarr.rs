@@ -39,7 +39,8 @@ fn write(
     write_whole_folder(path, |folder| fill(folder, &data))
 }
 
-fn fill(folder: &Path, data: &Dataset<'_>) -> io::Result<()> {
+/// Writes a table into a folder that is there. Of a table without planes all but its values is written.
+pub(super) fn fill(folder: &Path, data: &Dataset<'_>) -> io::Result<()> {
     let mut all = Map::new();
     let mut put = |name: String, value: Value| {
         std::fs::write(folder.join(&name), format!("{value:#}\n"))?;
@@ -131,7 +132,8 @@ fn chunks(folder: &Path, array: &Array<'_>, shape: [usize; 5]) -> io::Result<()>
     }
 }
 
-fn name_of(channel: usize, theta: usize) -> String {
+/// The chunk of a channel at a polar angle of the light.
+pub(super) fn name_of(channel: usize, theta: usize) -> String {
     format!("{channel}.{theta}.0.0.0")
 }
 

@@ -9,6 +9,7 @@
 //! | `groups` | which channels are filled together |
 //! | `blocks`, `planes` | bins → planes in memory |
 //! | `rows` | the same, written row by row |
+//! | `parts` | the same by several processes |
 //! | `directions` | a fit that is asked without a grid |
 //! | `behind` | the same of a dense BRDF, whose samples are still there |
 
@@ -18,6 +19,7 @@ mod directions;
 mod groups;
 mod options;
 mod origins;
+mod parts;
 mod planes;
 mod prepared;
 mod rows;
@@ -27,6 +29,7 @@ pub use behind::Behind;
 pub use blocks::{FilledBins, fill_bins};
 pub use directions::FitOfSamples;
 pub use options::{FillMethod, FillOptions};
+pub use parts::{Begun, FillInParts};
 pub use rows::fill_to_file;
 
 use crate::Error;

@@ -74,7 +74,8 @@ impl FromStr for FillMethod {
     }
 }
 
-/// A grid of more cells than this, each of three channels (12 bytes), is filled row by row, in twice the time.
+/// A grid of more cells than this, each of three channels (12 bytes), is filled row by row, by way of the
+/// disk.
 pub(super) const CELLS_IN_MEMORY: usize = 150_000_000;
 
 impl FillOptions {

@@ -1,4 +1,5 @@
-//! A fill that does not fit memory: written row by row, or a few channels at a time.
+//! A fill that does not fit memory: written row by row, or a few channels at a time. What its blocks give is kept on the
+//! disk of the file, at most half as much as will be in that, until all are solved.
 
 use super::FillAccount;
 use super::blocks::{chosen, sorted};
@@ -11,13 +12,18 @@ use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::provenance::Provenance;
 use crate::warnings::{self, AlbedoRows, DirectionalAlbedo};
-use gonia_brdf::interpolate::{AnyKernel, ByRows, Data, FillSettings, NewBlock};
+use gonia_brdf::interpolate::{
+    AnyKernel, AtCorners, ByRows, Data, FillSettings, KeptCells, NewBlock,
+};
 use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Grid};
+use gonia_formats::Scratch;
 use gonia_formats::dense::{RowsNote, TakeRow, write_dense_by_rows};
 use gonia_rig::{Channels, SampleValues, Scale};
 use std::io;
+use std::ops::Range;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Fills a grid that does not fit memory, and writes it row by row, or three channels at a time. `facts` are added
 /// to the file's provenance. The values are those of [`fill`](super::fill) on a grid that fits.
@@ -229,11 +235,11 @@ impl ToRows<'_> {
             for (k, channels) in groups.iter().enumerate() {
                 let fresh = Fresh::of(channels, &mut written);
                 if k == 0 {
-                    write_group(&first, &settings, &fresh, take, progress)?;
+                    write_group(&first, &settings, &fresh, self.path, take, progress)?;
                 } else {
                     let bins = self.bins_of(*channels, progress)?;
                     let known = sorted(&bins, settings, progress)?;
-                    write_group(&known, &settings, &fresh, take, progress)?;
+                    write_group(&known, &settings, &fresh, self.path, take, progress)?;
                 }
             }
             Ok(())
@@ -254,17 +260,63 @@ fn write_group<const N: usize>(
     known: &Data<'_, N>,
     settings: &FillSettings,
     fresh: &Fresh,
+    path: &Path,
     take: &TakeGroup<'_>,
     progress: &Progress<'_>,
 ) -> Result<(), Stopped>
 where
     dyn AnyKernel: NewBlock<N>,
 {
-    let rows = step(progress, Step::FittingBlocks, |share| {
-        ByRows::new(known, settings, share).map_err(Error::from)
+    let rows = ByRows::new(known, settings).map_err(Error::from)?;
+    let all = 0..rows.patches();
+    let kept = OnDisk::beside(path, rows.patches())?;
+    let of_patches = step(progress, Step::FittingBlocks, |share| {
+        rows.solve(all.clone().collect(), &kept, share)
     })?;
+    let corners = rows.corners(of_patches);
     step(progress, Step::InterpolatingAndWriting, |share| {
         let taken = |light, row: [&[f32]; N]| take(light, fresh, &row);
-        rows.each_row(share, &taken, || Error::Cancelled.into())
+        rows.each_row(all, &corners, &kept, share, &taken)
     })
+}
+
+/// Cells between their solving and their writing, beside the file that they are for.
+struct OnDisk {
+    scratch: Scratch,
+    /// By patch, where its cells begin: in numbers, once they are there.
+    starts: Vec<OnceLock<u64>>,
+}
+
+impl OnDisk {
+    fn beside(path: &Path, patches: usize) -> Result<Self, Error> {
+        Ok(Self {
+            scratch: Scratch::beside(path)?,
+            starts: (0..patches).map(|_| OnceLock::new()).collect(),
+        })
+    }
+}
+
+impl<const N: usize> KeptCells<N> for OnDisk {
+    type Error = Stopped;
+
+    fn put(&self, patch: usize, _: &AtCorners<N>, cells: &[[f32; N]]) -> Result<(), Stopped> {
+        let at = self.scratch.put(cells.as_flattened())?;
+        self.starts[patch].get_or_init(|| at);
+        Ok(())
+    }
+
+    fn get(
+        &self,
+        patch: usize,
+        cells: Range<usize>,
+        into: &mut Vec<[f32; N]>,
+    ) -> Result<(), Stopped> {
+        // All patches are put before the first cell is wanted.
+        let start = self.starts[patch].get().copied().unwrap_or(0);
+        let mut floats = Vec::with_capacity(N * cells.len());
+        let at = start + (N * cells.start) as u64;
+        self.scratch.get(at, N * cells.len(), &mut floats)?;
+        into.extend_from_slice(floats.as_chunks::<N>().0);
+        Ok(())
+    }
 }

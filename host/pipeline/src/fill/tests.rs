@@ -1,12 +1,16 @@
 //! Channels of every number, in memory and by rows.
 
 use super::*;
+use crate::export::{ExportSource, export};
 use crate::progress::silent;
 use crate::provenance::Provenance;
 use gonia_brdf::random::Random;
 use gonia_brdf::{Direction, Elementary, Sample, SymmetryKind};
 use gonia_formats::dense::read_dense_channels;
+use gonia_formats::export::export_format;
 use gonia_rig::{ChannelSamples, Channels};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Channel c of a broad lobe is c + 1 times its value, to a power that falls with c.
 fn truth(light: Direction, view: Direction, channel: usize, of: usize) -> f32 {
@@ -86,6 +90,103 @@ fn assert_rows_are_those_in_memory(of: impl Into<SampleValues>, options: &FillOp
     assert!(read.planes == whole.dense.planes, "{}", read.channels);
     assert_eq!(read.provenance["rig"], "a test");
     assert_eq!(format!("{rows:?}"), format!("{:?}", whole.account));
+}
+
+/// Two processes, the second of which finds what the first has left, must write what one process exports.
+fn assert_parts_are_the_whole(of: impl Into<SampleValues>, options: &FillOptions) {
+    let dir = tempfile::tempdir().unwrap();
+    let [whole, parts, folder] = ["whole.zarr", "parts.zarr", "parts"].map(|n| dir.path().join(n));
+    let (of, scale) = (of.into(), Scale::Relative);
+    let facts = Provenance::new();
+    let filled = fill(of.clone(), scale, options, &silent).unwrap();
+    let source = ExportSource {
+        dense: filled.dense,
+        path: Path::new("the fill"),
+        errors: None,
+        scale_by: None,
+    };
+    let zarr = export_format(&whole, None).unwrap();
+    export(source, &whole, zarr, 0).unwrap();
+    let begin = |of: SampleValues| FillInParts::begin(of, scale, options, &folder, &facts, &silent);
+    let Begun::Parts { fill: first, .. } = begin(of.clone()).unwrap() else {
+        panic!("blocks are wanted");
+    };
+    let (groups, patches, bands) = (first.groups(), first.patches(), first.bands());
+    first.solve(0, 0..patches / 2, &silent).unwrap();
+    assert!(first.write(0, 0, &silent).is_err(), "a patch is missing");
+    let error = first.finish(&parts).unwrap_err().to_string();
+    assert!(error.contains("is not written yet"), "{error}");
+    // It has died; another one takes up the folder.
+    let Begun::Parts { fill, remarks } = begin(of.clone()).unwrap() else {
+        panic!("blocks are wanted");
+    };
+    assert!(remarks.is_empty());
+    for group in 0..groups {
+        fill.solve(group, 0..patches, &silent).unwrap();
+        for band in (0..bands).rev() {
+            fill.write(group, band, &silent).unwrap();
+        }
+    }
+    for wrong in [
+        fill.solve(groups, 0..1, &silent),
+        fill.solve(0, 0..patches + 1, &silent),
+        fill.write(0, bands, &silent),
+    ] {
+        assert!(wrong.unwrap_err().to_string().contains("there are"));
+    }
+    let error = begin(of.of_channels([0; 3]).into())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("another fill"), "{error}");
+    fill.finish(&parts).unwrap();
+    assert!(!folder.exists());
+    assert_eq!(files(&parts), files(&whole));
+}
+
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_owned();
+                files.insert(name, std::fs::read(path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn parts_of_several_processes_are_a_fill_in_memory_byte_for_byte() {
+    for channels in [Channels::Single, bands(5), bands(40)] {
+        assert_parts_are_the_whole(samples(channels), &options(false));
+    }
+    let colours = samples(bands(3)).of_channels([0, 1, 2]);
+    assert_parts_are_the_whole(colours, &options(false));
+}
+
+#[test]
+fn a_fit_of_few_samples_is_no_work_to_share_and_a_failed_beginning_leaves_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("parts");
+    let mut few: Vec<Sample> = samples(bands(3)).of_channels([0, 1, 2]);
+    few.truncate(200);
+    // Places of one frame each: samples of frames are images of many.
+    (0..).zip(&mut few).for_each(|(k, sample)| sample.frame = k);
+    let begin = |samples: Vec<Sample>, options: &FillOptions| {
+        let facts = Provenance::new();
+        FillInParts::begin(samples, Scale::Relative, options, &folder, &facts, &silent)
+    };
+    let begun = begin(few.clone(), &FillOptions::with_step_deg(15.0)).unwrap();
+    assert!(matches!(begun, Begun::OneFit));
+    assert!(begin(few[..5].to_vec(), &options(false)).is_err());
+    let error = begin(few, &options(true)).unwrap_err().to_string();
+    assert!(error.contains("no error bars"), "{error}");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
 #[test]

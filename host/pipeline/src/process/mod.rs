@@ -15,12 +15,15 @@ pub(crate) mod reflectance;
 mod remarks;
 pub(crate) mod rig_check;
 pub mod sampled;
+pub mod sampled_bytes;
+mod shared;
 pub mod source;
 
 pub use account::{FrameReport, LeftOutCounts, OffsetStatistics, Outcome, Refusal};
 pub use gonia_rig::ReferenceCalibration;
 pub use masks::{MASKS, Masks};
 pub use sampled::{FrameSampler, Hidden, SampledFrame, SampledPoint};
+pub use shared::{process_shared, sample_share};
 pub use source::{FrameRow, FrameSource, Role};
 
 use crate::progress::Cancelled;
@@ -192,26 +195,57 @@ pub fn process(
     masks: &Masks,
     progress: Heard<'_>,
 ) -> Result<Processed, ProcessError> {
-    let sampler = FrameSampler::new(rig);
-    let heard = HeardRemarks::default();
-    let sampled = |row: &FrameRow, hidden: Hidden| {
-        if let Some(sampled) = sample_rows(rig, source, &sampler, row, hidden) {
-            return Ok(sampled);
+    let sampling = Sampling::new(rig, source);
+    let sampled = |row: &FrameRow, hidden: Hidden| sampling.sample(row, hidden);
+    let processed = process_sampled(rig, source.rows(), &sampled, masks, progress);
+    sampling.heard.judge(source.rows(), processed)
+}
+
+/// Samples a source's frames, and keeps what is to be said of them.
+struct Sampling<'a> {
+    rig: &'a Rig,
+    source: &'a dyn FrameSource,
+    sampler: FrameSampler,
+    heard: HeardRemarks,
+}
+
+impl<'a> Sampling<'a> {
+    fn new(rig: &'a Rig, source: &'a dyn FrameSource) -> Self {
+        Self {
+            rig,
+            source,
+            sampler: FrameSampler::new(rig),
+            heard: HeardRemarks::default(),
         }
-        match load(rig, source, row) {
-            Ok((frame, remarks)) => {
-                heard.of_frame(row, remarks);
-                Ok(sampler.sample(&frame, row, hidden))
+    }
+
+    /// A frame that cannot be used is one that is refused, unless none could be used.
+    fn sample(&self, row: &FrameRow, hidden: Hidden) -> Result<SampledFrame, ProcessError> {
+        match self.sample_usable(row, hidden) {
+            Ok((sampled, remarks)) => {
+                self.heard.of_frame(row, remarks);
+                Ok(sampled)
             }
             Err(error) if error.is_of_the_system() => Err(error),
             Err(error) => {
-                heard.unusable(row, error);
+                self.heard.unusable(row, error);
                 Ok(SampledFrame::refused(row, Refusal::Unusable))
             }
         }
-    };
-    let processed = process_sampled(rig, source.rows(), &sampled, masks, progress);
-    heard.judge(source.rows(), processed)
+    }
+
+    /// A frame, and what is to be said of it.
+    fn sample_usable(
+        &self,
+        row: &FrameRow,
+        hidden: Hidden,
+    ) -> Result<(SampledFrame, Vec<Remark>), ProcessError> {
+        if let Some(sampled) = sample_rows(self.rig, self.source, &self.sampler, row, hidden) {
+            return Ok((sampled, Vec::new()));
+        }
+        let (frame, remarks) = load(self.rig, self.source, row)?;
+        Ok((self.sampler.sample(&frame, row, hidden), remarks))
+    }
 }
 
 /// Hears the stage and the frames done in it.

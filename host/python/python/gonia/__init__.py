@@ -129,6 +129,10 @@ class Samples:
     def __len__(self):
         return len(self._of)
 
+    def __reduce__(self):
+        rows = self.rows
+        return Samples, (rows[:, :-1], self.channels, rows[:, -1], self.scale, self.provenance)
+
     def __repr__(self):
         return f"<gonia.Samples: {len(self)} of {', '.join(self.channels)}, {self.scale}>"
 

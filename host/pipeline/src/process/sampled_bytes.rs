@@ -1,4 +1,5 @@
-//! A frame's bytes in `frames.bin`, all little-endian:
+//! A sampled frame as bytes, as a session's `frames.bin` has it and as one process gives it to another; all
+//! little-endian:
 //!
 //! | bytes | what |
 //! |---|---|
@@ -13,9 +14,10 @@
 //! | and 20 | where a value: r, g, b; offset of its pixels x, y, mm; float32 |
 //! | 4, n | bytes of the mask, and the mask (as in masks.csv); none when nothing was hidden |
 
+use super::account::{FrameReport, Outcome, Refusal};
+use super::sampled::{SampledFrame, SampledPoint};
 use gonia_brdf::{Direction, Pose};
 use gonia_imaging::{LeftOut, Mask, PoseOffset, RegistrationFailure, Turn};
-use gonia_pipeline::process::{FrameReport, Outcome, Refusal, SampledFrame, SampledPoint};
 use gonia_rig::Role;
 
 const MAGIC: &[u8; 4] = b"GFR1";
@@ -210,28 +212,23 @@ impl Bytes<'_> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
+    use gonia_rig::FrameRow;
 
     /// A frame of three points.
-    pub fn some_frame(frame: u32, role: Role) -> SampledFrame {
-        let direction = |theta, phi| Direction::from_deg(theta, phi);
+    fn some_frame() -> SampledFrame {
+        let pose = Pose {
+            light: Direction::from_deg(15.0, 60.0),
+            view: Direction::from_deg(30.000_001, 359.9),
+        };
+        let row = FrameRow {
+            frame: 7,
+            role: Role::Reference,
+            pose,
+            file: String::new(),
+        };
         SampledFrame {
-            report: FrameReport {
-                frame,
-                role,
-                outcome: Outcome::Locked,
-                residual_px: 0.031,
-                pose_offset: PoseOffset {
-                    theta_deg: 0.01,
-                    phi_deg: -0.02,
-                },
-            },
-            reading: Pose {
-                light: direction(15.0, 60.0),
-                view: direction(30.000_001, 359.9),
-            },
-            view: direction(30.01, 359.88),
             points: vec![
                 Ok(SampledPoint {
                     rgb: [0.1, f32::INFINITY, -0.0],
@@ -240,7 +237,7 @@ pub(crate) mod tests {
                 Err(LeftOut::Border),
                 Err(LeftOut::Occlusion),
             ],
-            mask: None,
+            ..SampledFrame::refused(&row, Refusal::NoReference)
         }
     }
 
@@ -273,7 +270,7 @@ pub(crate) mod tests {
                 offset_deg: 3.0,
             })),
         ] {
-            let mut frame = some_frame(7, Role::Reference);
+            let mut frame = some_frame();
             frame.report.outcome = outcome;
             frame.mask = Mask::from_bytes(&{
                 let mut bytes = Vec::new();
@@ -290,7 +287,7 @@ pub(crate) mod tests {
 
     #[test]
     fn bytes_that_are_cut_or_too_many_are_no_frame() {
-        let bytes = to_bytes(&some_frame(0, Role::Material));
+        let bytes = to_bytes(&some_frame());
         for n in 0..bytes.len() {
             assert_eq!(from_bytes(&bytes[..n]), None, "{n}");
         }
