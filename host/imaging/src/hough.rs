@@ -3,6 +3,16 @@
 use crate::lines::LineStrip;
 use gonia_rig::Frame;
 
+/// What makes a bright line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineEdges {
+    /// A rise and a fall, strong together: one of them may be hidden or weak.
+    Together,
+    /// Where a gap of desk is seen between material and line, both: the material's edge is a fall as strong as both
+    /// of a thin line's together.
+    Both,
+}
+
 /// So much desk between material and line is seen as a gap, pixels.
 const SEEN_GAP_PX: f64 = 2.0;
 
@@ -24,8 +34,7 @@ impl StripLine {
 
 /// Finds the strongest bright line within `search_px` of the prediction. Every Sobel edge votes,
 /// with its sign, for the lines through it; a bright line is where a rise is followed, one line's
-/// width further out, by a fall. Where a gap of desk is seen between material and line, both must be there: the
-/// material's edge is a fall as strong as both together. `resolution` is the size of a bin in half widths of the line (of at
+/// width further out, by a fall, as `edges` says. `resolution` is the size of a bin in half widths of the line (of at
 /// least two pixels). Each station has the same say, however brightly it is lit.
 pub fn strongest_line(
     frame: &Frame,
@@ -33,6 +42,7 @@ pub fn strongest_line(
     half_width_mm: f64,
     search_px: f64,
     resolution: f64,
+    edges: LineEdges,
 ) -> Option<StripLine> {
     if strip.stations.is_empty() {
         return None;
@@ -71,7 +81,8 @@ pub fn strongest_line(
     }
     let apart = (half_width / bin).round().max(1.0) as usize;
     let gap_px = strip.edges.line[0][0] - strip.edges.material[0];
-    let score_of = |rise: f32, fall: f32| match gap_px > SEEN_GAP_PX {
+    let wants_both = edges == LineEdges::Both && gap_px > SEEN_GAP_PX;
+    let score_of = |rise: f32, fall: f32| match wants_both {
         true => rise.min(fall),
         false => rise + fall,
     };
@@ -137,7 +148,8 @@ mod tests {
         for side in [SIDES[2], SIDES[3]] {
             let strip = LineStrip::cut(&frame, &camera, &seen, target, side, &light, 30.0);
             let half_width = 0.5 * target.line_width_mm;
-            let line = strongest_line(&frame, &strip, half_width, 30.0, 0.5).unwrap();
+            let line = strongest_line(&frame, &strip, half_width, 30.0, 0.5, LineEdges::Both);
+            let line = line.unwrap();
             let expected = side.sign * OFF_PX;
             assert!(
                 (line.offset - expected).abs() <= 1.0 && line.slope.abs() <= 1.0,
