@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// What the scripts in `tests/readers` import, at the versions that they were tried with.
-const PACKAGES: [&str; 7] = [
+const PACKAGES: [&str; 9] = [
+    "MaterialX==1.39.5",
+    "jsonschema==4.26.0",
     "mitsuba==3.9.1",
     "netCDF4==1.7.5.1.post1",
     "numpy==2.4.6",
@@ -17,7 +19,13 @@ const PACKAGES: [&str; 7] = [
 ];
 
 /// Each reader's script, in `tests/readers`.
-const SCRIPTS: [&str; 3] = ["mitsuba_bsdf.py", "radiance_xml.py", "arrays.py"];
+const SCRIPTS: [&str; 5] = [
+    "mitsuba_bsdf.py",
+    "radiance_xml.py",
+    "arrays.py",
+    "materials.py",
+    "bird.py",
+];
 
 /// Has every reader read what gonia exports, and fails where one reads something else.
 pub fn check() -> Result<()> {

@@ -8,11 +8,16 @@ use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
 use gonia_formats::dense::{check_dense_name, read_dense};
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
-use gonia_formats::samples::{check_scale, read_samples};
-use gonia_formats::{check_output, check_writable_beside};
-use gonia_pipeline::fit::{
-    cells_of_dense, cells_of_samples, fit_model, five_digits, level_remark, write_fit,
+use gonia_formats::material::{
+    check_material, check_relative, is_material_name, material_endings, write_material,
 };
+use gonia_formats::samples::{check_scale, read_samples};
+use gonia_formats::{FileError, check_output, check_writable_beside, checksum, is_same_file};
+use gonia_pipeline::fit::{
+    FitResult, assume_scale, cells_of_dense, cells_of_samples, fit_model, five_digits,
+    level_remark, write_fit,
+};
+use gonia_pipeline::provenance::program;
 use gonia_rig::Scale;
 use std::path::{Path, PathBuf};
 
@@ -21,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// residuals vary together over patches of 30 degrees) and its error by stratum.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia fit dense.exr --model sadeghi -o sadeghi.exr\n  gonia fit dense.exr --samples samples.npy --model kurt2\n\nMODEL is lambert, ward, ggx, kurt1 to kurt4 (that many lobes, each with its azimuth), or sadeghi:\nthe microcylinder model of two threads, each with two tangents tilted by ±tilt, its reciprocal\nmean. Beside FIT.exr stands FIT.fit.toml, which `gonia report` of that folder shows.\n\nWith --samples the model is fitted to their bins. Uncertainties of a fit to the table alone do not\nhold what interpolation does to it: where it smooths a highlight, a lobe is as much too wide."
+    after_long_help = "Example:\n  gonia fit dense.exr --model sadeghi -o sadeghi.exr\n  gonia fit dense.exr --samples samples.npy --model kurt2\n  gonia fit dense.exr --model principled -o fabric.xml -o fabric.mtlx\n\nMODEL is lambert, ward, ggx, kurt1 to kurt4 (that many lobes, each with its azimuth), or sadeghi:\nthe microcylinder model of two threads, each with two tangents tilted by ±tilt, its reciprocal\nmean; or one of artists' programs, whose numbers mean 1/sr: principled (Disney's, as in Mitsuba),\ngltf or openpbr. Beside FIT.exr stands FIT.fit.toml, which `gonia report` of that folder shows.\n\nWith --samples the model is fitted to their bins. Uncertainties of a fit to the table alone do not\nhold what interpolation does to it: where it smooths a highlight, a lobe is as much too wide."
 )]
 pub struct Fit {
     /// The dense BRDF
@@ -32,9 +37,12 @@ pub struct Fit {
     /// Which model to fit
     #[arg(long, value_name = "MODEL")]
     model: StandardFamily,
-    /// The fitted model as a dense BRDF, on the same grid (OpenEXR)
-    #[arg(short, long, value_name = "FIT.exr")]
-    output: Option<PathBuf>,
+    /// The fitted model as a dense BRDF on the same grid (.exr), or as a material: .mtlx, .xml (Mitsuba), .gltf or .json; may be repeated
+    #[arg(short, long, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Take a relative BRDF for 1/sr after multiplying it by this factor
+    #[arg(long, value_name = "FACTOR")]
+    assume_scale: Option<f64>,
     /// What is minimised: differences of logarithms, or of f cosθi cosθv
     #[arg(long, value_enum, default_value = "log")]
     loss: LossArgument,
@@ -71,6 +79,61 @@ impl Fit {
             iterations: self.iterations,
             seed: self.seed,
         };
+        self.check_numbers()?;
+        self.check_outputs()?;
+        let progress = Progress::new();
+        let mut measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
+        if measured.scale == Scale::Relative && self.assume_scale.is_none() {
+            self.output
+                .iter()
+                .try_for_each(|path| check_relative(path))?;
+        }
+        let name = self.dense.display().to_string();
+        let mut cells = match &self.samples {
+            None => cells_of_dense(&measured.brdf, &settings),
+            Some(path) => {
+                let read = progress.stage("reading samples", |_| read_samples(path))?;
+                remarks::print(&read.remarks);
+                check_scale(path, read.scale, measured.scale)?;
+                let cells = cells_of_samples(&measured.brdf, &read.samples, &settings)
+                    .with_context(|| path.display().to_string())?;
+                remarks::print(level_remark(&measured.brdf, &cells, path).as_slice());
+                cells
+            }
+        };
+        let fitted_to = checksum::of_brdf(&measured.brdf);
+        if let Some(factor) = self.assume_scale {
+            measured = assume_scale(measured, &mut cells, factor).with_context(|| name.clone())?;
+        }
+        let family = self.model.for_values(measured.scale == Scale::Relative);
+        let watch = progress.watch();
+        let mut result = fit_model(&measured, &name, &cells, family, &settings, &watch)
+            .with_context(|| name.clone())?;
+        result.note.dense = Some(fitted_to);
+        print_note(&result.note);
+        let converged = result.note.converged;
+        self.write(result, measured.scale, &progress)?;
+        if !converged {
+            let names: Vec<String> = self
+                .output
+                .iter()
+                .map(|p| p.display().to_string())
+                .collect();
+            bail!(
+                "{name}: {} did not converge in {} steps; the best so far is {}, marked as such; try more --starts or --iterations",
+                self.model,
+                self.iterations,
+                if names.is_empty() {
+                    "printed above".to_owned()
+                } else {
+                    format!("in {}", names.join(", "))
+                }
+            );
+        }
+        Ok(())
+    }
+
+    fn check_numbers(&self) -> Result<()> {
         for (name, value, range) in [
             ("--cells", self.cells, 100..=1_000_000),
             ("--starts", self.starts, 1..=10_000),
@@ -84,56 +147,64 @@ impl Fit {
                 );
             }
         }
-        if let Some(output) = &self.output {
-            check_dense_name(output)?;
-            let samples = self.samples.as_deref();
-            let inputs: Vec<&Path> = samples.into_iter().chain([&*self.dense]).collect();
-            check_output(output, &inputs)?;
-            check_writable_beside(&FitNote::path_beside(output))?;
-        }
-        let progress = Progress::new();
-        let measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
-        let name = self.dense.display().to_string();
-        let cells = match &self.samples {
-            None => cells_of_dense(&measured.brdf, &settings),
-            Some(path) => {
-                let read = progress.stage("reading samples", |_| read_samples(path))?;
-                remarks::print(&read.remarks);
-                check_scale(path, read.scale, measured.scale)?;
-                let cells = cells_of_samples(&measured.brdf, &read.samples, &settings)
-                    .with_context(|| path.display().to_string())?;
-                remarks::print(level_remark(&measured.brdf, &cells, path).as_slice());
-                cells
+        match self.assume_scale {
+            Some(factor) if !(factor > 0.0 && factor.is_finite()) => {
+                bail!("--assume-scale {factor}: give a factor above 0")
             }
-        };
-        let result = fit_model(
-            &measured,
-            &name,
-            &cells,
-            self.model.for_values(measured.scale == Scale::Relative),
-            &settings,
-            &progress.watch(),
-        )
-        .with_context(|| name.clone())?;
-        print_note(&result.note);
-        let converged = result.note.converged;
-        if let Some(path) = &self.output {
-            progress.stage("writing the fitted model", |_| {
-                write_fit(path, result, measured.scale)
-            })?;
+            _ => Ok(()),
         }
-        if !converged {
-            bail!(
-                "{name}: {} did not converge in {} steps; the best so far is {}, marked as such; try more --starts or --iterations",
-                self.model,
-                self.iterations,
-                match &self.output {
-                    Some(path) => format!("in {}", path.display()),
-                    None => "printed above".to_owned(),
+    }
+
+    /// What can be known of the outputs before the work.
+    fn check_outputs(&self) -> Result<()> {
+        let samples = self.samples.as_deref();
+        let inputs: Vec<&Path> = samples.into_iter().chain([&*self.dense]).collect();
+        for (k, output) in self.output.iter().enumerate() {
+            let others = &self.output[..k];
+            if others.iter().any(|other| is_same_file(other, output)) {
+                bail!("--output {}: is given twice", output.display());
+            }
+            if is_material_name(output) {
+                check_material(output, &self.model.to_string())?;
+            } else {
+                let ending = output.extension();
+                let is_table = ending.is_none_or(|e| e.eq_ignore_ascii_case("exr"));
+                if !is_table || check_dense_name(output).is_err() {
+                    return Err(FileError::new(
+                        output,
+                        "has not the ending of a fit",
+                        format_args!("give .exr, {}", material_endings()),
+                    )
+                    .into());
                 }
-            );
+                if others.iter().any(|other| !is_material_name(other)) {
+                    bail!(
+                        "--output {}: one table is written; give one .exr",
+                        output.display()
+                    );
+                }
+                check_writable_beside(&FitNote::path_beside(output))?;
+            }
+            check_output(output, &inputs)?;
         }
         Ok(())
+    }
+
+    fn write(&self, result: FitResult, scale: Scale, progress: &Progress) -> Result<()> {
+        if self.output.is_empty() {
+            return Ok(());
+        }
+        progress.stage("writing the fitted model", |_| {
+            let (materials, tables): (Vec<_>, Vec<_>) =
+                self.output.iter().partition(|path| is_material_name(path));
+            for path in materials {
+                write_material(path, &result.note, &program())?;
+            }
+            match tables.first() {
+                Some(path) => write_fit(path, result, scale).map_err(anyhow::Error::from),
+                None => Ok(()),
+            }
+        })
     }
 }
 

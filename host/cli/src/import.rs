@@ -16,15 +16,15 @@ use std::path::{Path, PathBuf};
 
 /// Brings a material of the UTIA database (.bin), of MERL (.binary, isotropic), of Mitsuba or Zemax (.bsdf) or of
 /// Radiance (.xml) onto gonia's grid, so that every other command can compare, fit and draw it; one of Ngan, Durand and
-/// Matusik (.dat, anisotropic), which is full of holes, becomes samples for `gonia fill`.
+/// Matusik or ALTA (.dat), of Cornell (.astm) or of a pgII (.pab), which has holes, becomes samples for `gonia fill`.
 #[derive(clap::Args)]
 #[command(
     after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n  gonia import velvet.dat -o velvet.npy && gonia fill velvet.npy -o velvet.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Its files do not say whether they\nare 1/sr, and their readers disagree: they count as relative unless --scale absolute is given. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
 )]
 pub struct Import {
-    /// The material, .bin, .binary or .dat
+    /// The material
     material: PathBuf,
-    /// The dense BRDF to write (OpenEXR), or for .dat the samples (.npy or .csv)
+    /// The dense BRDF to write (OpenEXR), or for .dat, .astm and .pab the samples (.npy or .csv)
     #[arg(short, long, value_name = "DENSE.exr")]
     output: PathBuf,
     /// Step of the grid in degrees
@@ -49,10 +49,14 @@ impl Import {
                 check_output(&self.output, &[&self.material])?;
                 self.import_brdf(grid, name, scale, model.as_ref())
             }
-            ForeignContent::Samples { read } => {
+            ForeignContent::Samples { scale, read } => {
+                let scale = match (scale, self.scale) {
+                    (None, None) => None,
+                    (known, _) => Some(self.scale_of(name, *known)?.0),
+                };
                 check_sample_name(&self.output)?;
                 check_output(&self.output, &[&self.material])?;
-                self.import_samples(name, *read)
+                self.import_samples(name, scale, *read)
             }
         }
     }
@@ -110,17 +114,18 @@ impl Import {
     fn import_samples(
         &self,
         format: &str,
+        scale: Option<Scale>,
         read: fn(&Path) -> Result<Vec<Sample>, FileError>,
     ) -> Result<()> {
         let progress = Progress::new();
-        let samples = progress.stage("reading the bins", |_| read(&self.material))?;
+        let samples = progress.stage("reading the samples", |_| read(&self.material))?;
         let note = SampleNote {
-            scale: self.scale.map(Scale::from),
+            scale,
             provenance: self.provenance(format),
         };
         write_noted_samples(&self.output, &samples, &note)?;
         outln!(
-            "{} bins hold a measurement; gonia fill {} makes them dense",
+            "{} directions hold a measurement; gonia fill {} makes them dense",
             count(samples.len() as u64),
             self.output.display()
         );

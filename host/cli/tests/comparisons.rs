@@ -5,7 +5,7 @@ mod common;
 
 use common::{gonia, gonia_ok, refused, text};
 use gonia_brdf::direction::local_direction;
-use gonia_brdf::model::{Brdf, Kurt};
+use gonia_brdf::model::{Brdf, Ggx, Kurt};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::dense::{read_dense, write_dense};
@@ -80,6 +80,58 @@ fn a_fit_that_does_not_converge_says_so_and_marks_what_it_keeps() {
             .unwrap()
             .converged
     );
+}
+
+#[test]
+fn a_fit_is_written_as_a_material_and_a_relative_one_only_with_a_factor() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let (dense, table, xml, json) = (path("d.exr"), path("p.exr"), path("p.xml"), path("p.json"));
+    let lobe = Ggx {
+        diffuse: [0.2, 0.1, 0.05],
+        specular: [0.5; 3],
+        f0: 0.04,
+        alpha_x: 0.3,
+        alpha_y: 0.2,
+        azimuth_deg: 20.0,
+    };
+    write(&dense, 15.0, &lobe, Scale::Relative);
+    let (dense, table) = (text(&dense), text(&table));
+    let model = ["fit", dense, "--model", "principled", "-o", text(&xml)];
+    let said = refused(&model, "");
+    assert!(said.contains("--assume-scale") && !xml.exists(), "{said}");
+    let more = ["-o", text(&json), "-o", table, "--assume-scale", "2"];
+    let fast = ["--cells", "400", "--starts", "4"];
+    gonia_ok(&[&model[..], &more, &fast].concat(), "");
+    let written = std::fs::read_to_string(&xml).unwrap();
+    assert!(written.contains("<bsdf type=\"principled\""), "{written}");
+    assert!(
+        std::fs::read_to_string(&json)
+            .unwrap()
+            .contains("\"delta_e00_sphere\"")
+    );
+    let file = read_dense(Path::new(table)).unwrap();
+    assert_eq!(file.scale, Scale::Absolute);
+    assert!(file.provenance["scale_assumed"].contains("by 2"));
+    for (name, model, said) in [
+        (
+            "a.zmx",
+            "principled",
+            ".exr, .mtlx (MaterialX), .xml (Mitsuba), .gltf (glTF) or .json (JSON)",
+        ),
+        ("a.xml", "gltf", "fit --model principled"),
+        ("a.mtlx", "kurt2", "fit --model principled, gltf or openpbr"),
+        ("d.exr", "ggx", "is an input too"),
+    ] {
+        let out = path(name);
+        let found = refused(&["fit", dense, "--model", model, "-o", text(&out)], "");
+        assert!(
+            found.contains(said) && found.lines().count() == 1,
+            "{found}"
+        );
+    }
+    let twice = ["fit", dense, "--model", "ggx", "-o", table, "-o", table];
+    assert!(refused(&twice, "").contains("is given twice"));
 }
 
 #[test]

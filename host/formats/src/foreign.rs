@@ -47,13 +47,19 @@ mod tests {
         ] {
             assert_eq!(foreign_format(&at(name)).ok().unwrap().name, format);
         }
+        let alta = at("b.dat");
+        std::fs::write(&alta, "#DIM 3 1\n").unwrap();
+        assert_eq!(foreign_format(&alta).ok().unwrap().name, "ALTA text");
+        // 35 bins, the letter # as a number.
+        std::fs::write(&alta, 35i32.to_le_bytes()).unwrap();
+        assert!(foreign_format(&alta).ok().unwrap().name.starts_with("Ngan"));
         let by_bytes = at("velvet.brdf");
         let header = [90i32, 90, 180].map(i32::to_le_bytes);
         std::fs::write(&by_bytes, header.as_flattened()).unwrap();
         assert_eq!(foreign_format(&by_bytes).ok().unwrap().name, "MERL .binary");
         for name in ["a.txt", "a.exr"] {
             let error = foreign_format(&at(name)).err().unwrap().to_string();
-            let said = "neither .bin (UTIA), .binary (MERL), .dat (Ngan, Durand, Matusik), .bsdf (RGL, Mitsuba's measured), .xml (Radiance, WINDOW) nor .bsdf (Zemax); give other samples to gonia fill as CSV";
+            let said = "neither .bin (UTIA), .binary (MERL), .dat (ALTA), .dat (Ngan, Durand, Matusik), .bsdf (RGL, Mitsuba's measured), .xml (Radiance, WINDOW), .bsdf (Zemax), .astm (Cornell ASTM), .pab (pab text) nor .json (BiRD); give other samples to gonia fill as CSV";
             assert!(error.ends_with(said), "{error}");
         }
     }

@@ -259,6 +259,8 @@ pub enum ForeignContent {
     },
     /// Samples, with directions that were not measured.
     Samples {
+        /// Whether their values are 1/sr; `None` where nobody knows.
+        scale: Option<Scale>,
         /// Reads a file, which may fail with one line that names it.
         read: fn(&Path) -> Result<Vec<Sample>, FileError>,
     },

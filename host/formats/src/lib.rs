@@ -14,12 +14,15 @@
 //! | [`rig_toml`], [`plan_csv`], [`masks_csv`], [`cell_mask`], [`directions_csv`] | what a session is made by and leaves behind |
 //! | [`fill_parts`], [`Scratch`] | what a fill keeps on the disk: one that several processes share, or one of rows |
 //! | [`checksum`] | what ties a note to the file that it was written of |
+//! | [`material`] | fitted models as materials of other programs |
 //! | [`Summary`], [`fit_toml`], [`baselines_toml`] | what a run found, for the report |
 //! | [`photo`], [`toml_text`] | pictures from outside; TOML with errors that name the line |
 //!
 //! A new format of dense BRDFs, of samples or of another group is one file that defines a `Format`
 //! (`dense_exr.rs` and `utia.rs` are examples), and one row in `table.rs`.
 
+mod alta;
+mod astm;
 pub mod baselines_toml;
 mod capture_folder;
 pub mod cell_mask;
@@ -50,6 +53,7 @@ pub mod frame_exr;
 pub mod frames_csv;
 mod lossless_jpeg;
 pub mod masks_csv;
+pub mod material;
 mod merl;
 mod named_table;
 mod ngan;

@@ -26,7 +26,10 @@ pub(super) static FORMAT: Format = Format {
     magic: &[],
     content: Content::Foreign(ForeignFormat {
         name: "Ngan, Durand and Matusik .dat",
-        content: ForeignContent::Samples { read: read_ngan },
+        content: ForeignContent::Samples {
+            scale: None,
+            read: read_ngan,
+        },
     }),
 };
 

@@ -2,7 +2,7 @@
 //! process, however that ends.
 
 use crate::FileError;
-use crate::floats::{floats_of, to_bytes};
+use crate::floats::{floats_of, write_bytes};
 use crate::read_at::{read_exact_at, write_all_at};
 use crate::whole_file::folder_of;
 use std::fs::File;
@@ -39,7 +39,10 @@ impl Scratch {
     /// The disk is full.
     pub fn put(&self, values: &[f32]) -> Result<u64, FileError> {
         let at = self.end.fetch_add(values.len() as u64, Relaxed);
-        write_all_at(&self.file, &to_bytes(values), 4 * at).map_err(|error| {
+        let written = write_bytes(values, |before, bytes| {
+            write_all_at(&self.file, bytes, 4 * (at + before as u64))
+        });
+        written.map_err(|error| {
             let so_far = 4.0 * (at + values.len() as u64) as f64 / 1e9;
             FileError::new(
                 &self.output,

@@ -1,24 +1,30 @@
 //! The table of all formats, and how a file's format is recognised.
 
-use crate::export::{radiance, zemax};
+use crate::export::{bird, pab, radiance, zemax};
 use crate::format::{Content, Format};
-use crate::{FileError, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia};
+use crate::{
+    FileError, alta, astm, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia,
+};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 /// Every format. The first one of each kind is written where a name has no known ending.
-static FORMATS: [&Format; 10] = [
+static FORMATS: [&Format; 14] = [
     &dense_exr::FORMAT,
     &samples_npy::FORMAT,
     &samples_csv::FORMAT,
     &samples_npz::FORMAT,
     &utia::FORMAT,
     &merl::FORMAT,
+    &alta::FORMAT,
     &ngan::FORMAT,
     &rgl::FORMAT,
     &radiance::FORMAT,
     &zemax::FORMAT,
+    &astm::FORMAT,
+    &pab::FORMAT,
+    &bird::FORMAT,
 ];
 
 /// The formats of a kind, in the order of the table.
@@ -36,7 +42,10 @@ pub(super) fn format_of_file(path: &Path) -> Result<Option<&'static Format>, Fil
     let start = first_bytes(path);
     let is_begun_so = |format: &&Format| {
         let start = start.as_deref().unwrap_or_default();
-        !format.magic.is_empty() && start.starts_with(format.magic)
+        let is_begun = !format.magic.is_empty() && start.starts_with(format.magic);
+        // One byte begins too much else: the ending has to say it too, and that it is text.
+        let is_text = || start.get(1).is_some_and(|byte| *byte != 0);
+        is_begun && (format.magic.len() > 1 || (is_named_so(format, path) && is_text()))
     };
     // Of two with one ending, one is known by its first bytes: a file without them is the other.
     let by_name = || {

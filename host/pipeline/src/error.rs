@@ -79,7 +79,7 @@ pub enum Error {
     },
     /// An export of uncertainties to a format that has no place for them.
     #[error(
-        "the format {format} has no place for uncertainties: leave --error out, or give --format netcdf or zarr"
+        "the format {format} has no place for uncertainties: leave --error out, or give --format netcdf, zarr or bird"
     )]
     NoUncertainties {
         /// The format's name.

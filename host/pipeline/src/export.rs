@@ -2,8 +2,9 @@
 
 use crate::colours::colours_of;
 use crate::error::Error;
+use crate::provenance::{SCALE_ASSUMED, scale_assumed};
 use gonia_brdf::{DenseBrdf, Direction, Elementary, Pose, Sample};
-use gonia_formats::export::{ExportFormat, ExportSettings, Holds, How, Meaning};
+use gonia_formats::export::{ExportFormat, ExportSettings, Holds, How, Meaning, Point};
 use gonia_formats::foreign::ForeignBrdf;
 use gonia_rig::{Channels, DenseChannels, DenseFile, Remark, Scale};
 use rayon::prelude::*;
@@ -90,6 +91,10 @@ pub fn export(
             write(path, &dense, errors.as_ref())?;
             of_table(&dense, &read(path)?)
         }
+        (How::Points { write, read }, errors) => {
+            remarks.extend(write(path, &dense, errors.as_ref(), resolution)?);
+            of_points(&dense, &read(path)?)
+        }
         (_, Some(_)) => {
             return Err(Error::NoUncertainties {
                 format: format.title,
@@ -164,10 +169,8 @@ fn scale(dense: &mut DenseChannels, factor: f64) {
     let by = |value: &mut f32| *value = (f64::from(*value) * factor) as f32;
     dense.planes.iter_mut().flatten().for_each(by);
     dense.scale = Scale::Absolute;
-    dense.provenance.insert(
-        "scale_assumed".into(),
-        format!("1/sr after multiplying by {factor}"),
-    );
+    let said = scale_assumed(factor);
+    dense.provenance.insert(SCALE_ASSUMED.into(), said);
 }
 
 fn of_brdf(table: &DenseBrdf, written: &dyn ForeignBrdf) -> ExportError {
@@ -195,6 +198,20 @@ fn of_samples(table: &DenseBrdf, written: &[Sample]) -> ExportError {
     };
     figures(
         written.par_iter().map(of_sample).collect(),
+        Places::OfTheFile,
+    )
+}
+
+fn of_points(table: &DenseChannels, written: &[Point]) -> ExportError {
+    let of_point = |point: &Point| {
+        let node = |d: Direction| table.grid.nearest(d.theta_deg(), d.phi_deg());
+        let cell = table.grid.cell(node(point.light)?, node(point.view)?);
+        let value = f64::from(*table.planes.get(point.channel)?.get(cell)?);
+        let are_positive = value > 0.0 && point.value > 0.0;
+        are_positive.then(|| (point.value / value).natural_log().abs())
+    };
+    figures(
+        written.par_iter().map(of_point).collect(),
         Places::OfTheFile,
     )
 }

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::budget::{budget_in, shared_errors};
 use crate::compare::{Options, Side, Table, compare};
 use crate::progress::{Progress, Step, step};
-use crate::provenance::of_this_program;
+use crate::provenance::{SCALE_ASSUMED, of_this_program, scale_assumed};
 use gonia_brdf::Elementary;
 use gonia_brdf::fit::{self, Cell, FitSettings, ModelFamily};
 use gonia_brdf::{Bins, DenseBrdf, Direction, Sample};
@@ -23,6 +23,8 @@ pub struct FitResult {
     pub note: FitNote,
     /// The model on the grid of the dense BRDF.
     pub dense: DenseBrdf,
+    /// By what factor its values are 1/sr, where somebody said so.
+    pub scale_assumed: Option<String>,
 }
 
 /// Cells to fit to: of the dense BRDF itself, half of them spread evenly and half where it is bright.
@@ -116,7 +118,11 @@ pub fn fit_model<F: ModelFamily + Display>(
     })?;
     let mut note = FitNote::new(&fit, seconds, figures);
     note.dense = Some(checksum::of_brdf(&measured.brdf));
-    Ok(FitResult { note, dense })
+    Ok(FitResult {
+        note,
+        dense,
+        scale_assumed: measured.provenance.get(SCALE_ASSUMED).cloned(),
+    })
 }
 
 /// How far a table is from a measured one, as it is: the fit was made in the measured one's scale.
@@ -137,6 +143,39 @@ fn against(
     };
     let other = Side::Table(absolute(&measured.brdf));
     Ok(compare(absolute(dense), other, &options)?)
+}
+
+/// Takes a relative BRDF, and the cells of it, for 1/sr after multiplying them; an absolute one stays as it is.
+///
+/// # Errors
+/// As of a table with values that a BRDF cannot have.
+pub fn assume_scale(
+    measured: DenseFile,
+    cells: &mut [Cell],
+    factor: f64,
+) -> Result<DenseFile, Error> {
+    if measured.scale == Scale::Absolute {
+        return Ok(measured);
+    }
+    let DenseFile {
+        brdf,
+        mut provenance,
+        ..
+    } = measured;
+    let grid = brdf.grid();
+    let mut planes = brdf.into_planes();
+    for value in planes.iter_mut().flatten() {
+        *value = (f64::from(*value) * factor) as f32;
+    }
+    for value in cells.iter_mut().flat_map(|cell| &mut cell.value) {
+        *value *= factor;
+    }
+    provenance.insert(SCALE_ASSUMED.into(), scale_assumed(factor));
+    Ok(DenseFile {
+        brdf: DenseBrdf::new(grid, planes).ok_or(Error::UnequalPlanes)?,
+        scale: Scale::Absolute,
+        provenance,
+    })
 }
 
 /// Writes the tabulated model, and its note beside it.
@@ -161,6 +200,8 @@ pub fn write_fit(path: &Path, result: FitResult, scale: Scale) -> Result<(), Err
         .map(|p| format!("{} {}", p.name, five_digits(p.value)))
         .collect();
     provenance.insert("fit_parameters".into(), numbers.join(", "));
+    let assumed = result.scale_assumed;
+    provenance.extend(assumed.map(|text| (SCALE_ASSUMED.to_owned(), text)));
     note.write(&FitNote::path_beside(path))?;
     write_dense(
         path,

@@ -18,3 +18,11 @@ pub fn program() -> String {
         None => format!("gonia {version}"),
     }
 }
+
+/// Name of the fact that values became 1/sr by a factor that somebody said.
+pub const SCALE_ASSUMED: &str = "scale_assumed";
+
+/// The fact for [`SCALE_ASSUMED`].
+pub(crate) fn scale_assumed(factor: f64) -> String {
+    format!("1/sr after multiplying by {factor}")
+}

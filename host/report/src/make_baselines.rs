@@ -49,7 +49,7 @@ pub fn make_baselines(
                 }
                 Made::Fitted(result, scale) => {
                     rows.push(draw_baseline(&row.name, &result.dense));
-                    write_fit(&path(&format!("{}.exr", row.name)), result, scale)?;
+                    write_fit(&path(&format!("{}.exr", row.name)), *result, scale)?;
                 }
             }
             Ok::<(), Error>(())

@@ -107,6 +107,27 @@ impl Parameter {
         CHANNELS.map(|channel| Self::new(format!("{name}_{channel}"), range))
     }
 
+    /// A number from 0 to 1.
+    pub(super) fn share(name: impl Into<String>, start: (f64, f64)) -> Self {
+        Self::new(name, Range::Linear(0.0, 1.0)).starting(start)
+    }
+
+    /// An azimuth in degrees whose half turn is the same again.
+    pub(super) fn azimuth(name: impl Into<String>) -> Self {
+        Self {
+            unit: "deg",
+            ..Self::new(name, Range::Azimuth).starting((0.0, 180.0))
+        }
+    }
+
+    /// A factor over all, for models whose numbers mean 1/sr where the values are relative.
+    pub(super) fn scale() -> Self {
+        Self {
+            is_amplitude: true,
+            ..Self::new("scale", Range::Logarithmic(1e-4, 1e3)).starting((0.3, 10.0))
+        }
+    }
+
     /// The same with other starts.
     #[must_use]
     pub fn starting(self, start: (f64, f64)) -> Self {
@@ -166,6 +187,13 @@ impl ParameterValues {
         let mut named = self.names.iter().zip(&mut self.numbers);
         if let Some((_, number)) = named.find(|(n, _)| *n == name) {
             *number = value;
+        }
+    }
+
+    /// Brings an azimuth into 0 .. 180 degrees.
+    pub(super) fn half_turn(&mut self, azimuth: &str) {
+        if let Some(value) = self.get(azimuth) {
+            self.set(azimuth, value.rem_euclid(180.0));
         }
     }
 

@@ -5,6 +5,7 @@
 //! the darkest cells from deciding), or the cosine-weighted difference. All channels are fitted at
 //! once, from many random starts on few cells; the best of them go on with all.
 
+mod artist;
 mod cells;
 mod family;
 mod least_squares;
@@ -12,6 +13,7 @@ mod range;
 mod standard;
 mod uncertainty;
 
+pub use artist::{AZIMUTH, ArtistModel};
 pub use cells::{Cell, draw, draw_measured};
 pub use family::{ModelFamily, Parameter, ParameterValues};
 pub use range::Range;

@@ -1,5 +1,6 @@
 //! The families of this crate's own models.
 
+use super::artist::{AZIMUTH, ArtistModel};
 use super::family::{ModelFamily, Parameter, ParameterValues};
 use super::range::Range;
 use crate::direction::Vec3;
@@ -27,11 +28,20 @@ pub enum StandardFamily {
         /// Whether a factor over all is fitted too, for values that are not 1/sr.
         scaled: bool,
     },
+    /// A model of artists' programs.
+    Artist {
+        /// Which.
+        model: ArtistModel,
+        /// Whether a factor over all is fitted too, for values that are not 1/sr.
+        scaled: bool,
+    },
 }
 
 /// A name that is no model's.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
-#[error("\"{0}\" is no model: choose lambert, ward, ggx, kurt1 to kurt4 or sadeghi")]
+#[error(
+    "\"{0}\" is no model: choose lambert, ward, ggx, kurt1 to kurt4, sadeghi, principled, gltf or openpbr"
+)]
 pub struct UnknownFamily(String);
 
 impl FromStr for StandardFamily {
@@ -47,7 +57,10 @@ impl FromStr for StandardFamily {
             "kurt3" => StandardFamily::Kurt { lobes: 3 },
             "kurt4" => StandardFamily::Kurt { lobes: 4 },
             "sadeghi" => StandardFamily::Sadeghi { scaled: false },
-            _ => return Err(UnknownFamily(text.to_owned())),
+            _ => StandardFamily::Artist {
+                model: text.parse().map_err(|()| UnknownFamily(text.to_owned()))?,
+                scaled: false,
+            },
         })
     }
 }
@@ -60,6 +73,7 @@ impl fmt::Display for StandardFamily {
             StandardFamily::Ward => f.write_str("ward"),
             StandardFamily::Kurt { lobes } => write!(f, "kurt{lobes}"),
             StandardFamily::Sadeghi { .. } => f.write_str("sadeghi"),
+            StandardFamily::Artist { model, .. } => model.fmt(f),
         }
     }
 }
@@ -70,6 +84,10 @@ impl StandardFamily {
     pub fn for_values(self, are_relative: bool) -> Self {
         match self {
             StandardFamily::Sadeghi { .. } => StandardFamily::Sadeghi {
+                scaled: are_relative,
+            },
+            StandardFamily::Artist { model, .. } => StandardFamily::Artist {
+                model,
                 scaled: are_relative,
             },
             other => other,
@@ -83,15 +101,15 @@ impl ModelFamily for StandardFamily {
             StandardFamily::Lambert => amplitude("diffuse", 1e2, (0.3, 1.0)).to_vec(),
             StandardFamily::Ggx => {
                 let mut list = base_and_lobe();
-                list.push(unit_share("f0", (0.02, 0.6)));
+                list.push(Parameter::share("f0", (0.02, 0.6)));
                 list.extend(roughness("alpha_x", "alpha_y"));
-                list.push(azimuth("azimuth"));
+                list.push(Parameter::azimuth("azimuth"));
                 list
             }
             StandardFamily::Ward => {
                 let mut list = base_and_lobe();
                 list.extend(roughness("alpha_x", "alpha_y"));
-                list.push(azimuth("azimuth"));
+                list.push(Parameter::azimuth("azimuth"));
                 list
             }
             StandardFamily::Kurt { lobes } => {
@@ -102,14 +120,13 @@ impl ModelFamily for StandardFamily {
             StandardFamily::Sadeghi { scaled } => {
                 let mut list: Vec<Parameter> = (1..=2).flat_map(thread_parameters).collect();
                 list.push(Parameter::new("cover", Range::Linear(0.05, 1.0)).starting((0.5, 0.98)));
-                list.push(unit_share("cover_share1", (0.2, 0.8)));
-                if scaled {
-                    let range = Range::Logarithmic(1e-4, 1e3);
-                    list.push(Parameter {
-                        is_amplitude: true,
-                        ..Parameter::new("scale", range).starting((0.3, 10.0))
-                    });
-                }
+                list.push(Parameter::share("cover_share1", (0.2, 0.8)));
+                list.extend(scaled.then(Parameter::scale));
+                list
+            }
+            StandardFamily::Artist { model, scaled } => {
+                let mut list = model.parameters();
+                list.extend(scaled.then(Parameter::scale));
                 list
             }
         }
@@ -145,10 +162,11 @@ impl ModelFamily for StandardFamily {
                     thread(values, 1, cover * share)?,
                     thread(values, 2, cover * (1.0 - share))?,
                 ];
-                Box::new(Scaled {
-                    model: Reciprocal(Microcylinder::new(&threads)),
-                    factor: if scaled { values.get("scale")? } else { 1.0 },
-                })
+                let model = Box::new(Reciprocal(Microcylinder::new(&threads)));
+                with_scale(model, scaled, values)?
+            }
+            StandardFamily::Artist { model, scaled } => {
+                with_scale(model.model(values)?, scaled, values)?
             }
         })
     }
@@ -172,6 +190,7 @@ impl ModelFamily for StandardFamily {
     fn canonical(&self, mut values: ParameterValues) -> ParameterValues {
         match *self {
             StandardFamily::Lambert => {}
+            StandardFamily::Artist { .. } => values.half_turn(AZIMUTH),
             StandardFamily::Ggx | StandardFamily::Ward => {
                 narrow_axis_first(&mut values, "alpha_x", "alpha_y", "azimuth");
             }
@@ -201,8 +220,8 @@ impl ModelFamily for StandardFamily {
                 }
             }
             StandardFamily::Sadeghi { .. } => {
-                half_turn(&mut values, "azimuth1");
-                half_turn(&mut values, "azimuth2");
+                values.half_turn("azimuth1");
+                values.half_turn("azimuth2");
                 if let Some(share) = values.get("cover_share1").filter(|share| *share < 0.5) {
                     for (a, b) in thread_parameters(1).into_iter().zip(thread_parameters(2)) {
                         values.swap(&a.name, &b.name);
@@ -215,13 +234,6 @@ impl ModelFamily for StandardFamily {
     }
 }
 
-/// An azimuth in 0 .. 180 degrees.
-fn half_turn(values: &mut ParameterValues, azimuth: &str) {
-    if let Some(value) = values.get(azimuth) {
-        values.set(azimuth, value.rem_euclid(180.0));
-    }
-}
-
 /// The smaller roughness first: the other one lies across it.
 fn narrow_axis_first(values: &mut ParameterValues, x: &str, y: &str, azimuth: &str) {
     if values.get(x) > values.get(y) {
@@ -230,7 +242,7 @@ fn narrow_axis_first(values: &mut ParameterValues, x: &str, y: &str, azimuth: &s
             values.set(azimuth, value + 90.0);
         }
     }
-    half_turn(values, azimuth);
+    values.half_turn(azimuth);
 }
 
 /// Lobe number `k` of Kurt's model.
@@ -262,9 +274,22 @@ fn thread(values: &ParameterValues, k: usize, cover: f64) -> Option<Thread> {
     })
 }
 
+/// A model, times the factor over all where there is one.
+fn with_scale(
+    model: Box<dyn Brdf>,
+    scaled: bool,
+    values: &ParameterValues,
+) -> Option<Box<dyn Brdf>> {
+    if !scaled {
+        return Some(model);
+    }
+    let factor = values.get("scale")?;
+    Some(Box::new(Scaled { model, factor }))
+}
+
 /// A model times a factor.
 struct Scaled {
-    model: Reciprocal,
+    model: Box<dyn Brdf>,
     factor: f64,
 }
 
@@ -277,10 +302,10 @@ impl Brdf for Scaled {
 fn lobe_parameters(k: usize) -> Vec<Parameter> {
     let n = |name: &str| format!("{name}{k}");
     let mut list = amplitude(&n("specular"), 1e3, (0.3, 10.0)).to_vec();
-    list.push(unit_share(&n("f0"), (0.02, 0.5)));
+    list.push(Parameter::share(n("f0"), (0.02, 0.5)));
     list.extend(roughness(&n("mx"), &n("my")));
-    list.push(unit_share(&n("alpha"), (0.1, 0.6)));
-    list.push(azimuth(&n("azimuth")));
+    list.push(Parameter::share(n("alpha"), (0.1, 0.6)));
+    list.push(Parameter::azimuth(n("azimuth")));
     list
 }
 
@@ -295,10 +320,10 @@ fn thread_parameters(k: usize) -> Vec<Parameter> {
     let mut list = albedo.map(|p| p.starting((0.02, 0.4))).to_vec();
     list.extend([
         number("index", Range::Linear(1.1, 2.2), (1.3, 1.6)),
-        unit_share(&n("isotropic"), (0.1, 0.5)),
+        Parameter::share(n("isotropic"), (0.1, 0.5)),
         degrees("surface_width", Range::Logarithmic(1.0, 90.0), (3.0, 25.0)),
         degrees("volume_width", Range::Logarithmic(2.0, 120.0), (6.0, 50.0)),
-        azimuth(&n("azimuth")),
+        Parameter::azimuth(n("azimuth")),
         degrees("tilt", Range::Linear(0.0, 60.0), (3.0, 40.0)),
     ]);
     list
@@ -319,29 +344,27 @@ fn amplitude(name: &str, most: f64, start: (f64, f64)) -> [Parameter; 3] {
     })
 }
 
-/// A number from 0 to 1.
-fn unit_share(name: &str, start: (f64, f64)) -> Parameter {
-    Parameter::new(name, Range::Linear(0.0, 1.0)).starting(start)
-}
-
 /// Two roughnesses.
 fn roughness(x: &str, y: &str) -> [Parameter; 2] {
     let one = |name, start| Parameter::new(name, Range::Logarithmic(0.005, 3.0)).starting(start);
     [one(x, (0.05, 0.4)), one(y, (0.1, 0.9))]
 }
 
-fn azimuth(name: &str) -> Parameter {
-    Parameter {
-        unit: "deg",
-        ..Parameter::new(name, Range::Azimuth).starting((0.0, 180.0))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const ALL: [&str; 6] = ["lambert", "ggx", "ward", "kurt1", "kurt2", "sadeghi"];
+    const ALL: [&str; 9] = [
+        "lambert",
+        "ggx",
+        "ward",
+        "kurt1",
+        "kurt2",
+        "sadeghi",
+        "principled",
+        "gltf",
+        "openpbr",
+    ];
 
     fn start(family: StandardFamily, seed: u64) -> ParameterValues {
         let mut random = Random::new(seed);

@@ -12,7 +12,7 @@ use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::exponential::exponentials;
 use super::fill::{FillError, Task};
-use super::patches::{Patch, cover};
+use super::patches::{Cover, Patch, cover};
 use super::refine::Solved;
 use crate::grid::Grid;
 use crate::progress::Progress;
@@ -21,9 +21,16 @@ use rayon::prelude::*;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// A fill of which the rows are still to be made.
-pub struct ByRows<'a, const N: usize = 3> {
+/// The first half: solves pairs of patches.
+pub struct Solver<'a, const N: usize = 3> {
     task: Task<'a, N>,
+}
+
+/// The second half: makes rows of what was solved. It needs no data.
+pub struct Rows {
+    grid: Grid,
+    cover: Cover,
+    blend_limit: f32,
 }
 
 /// Keeps the logarithms of cells from the solving of their pairs to the writing of their rows: by patch, those of its
@@ -75,22 +82,17 @@ struct Work<const N: usize> {
     arch: Arch,
 }
 
-impl<'a, const N: usize> ByRows<'a, N>
+impl<'a, const N: usize> Solver<'a, N>
 where
     dyn AnyKernel: NewBlock<N>,
 {
-    /// Divides the grid.
+    /// Of data and settings.
     ///
     /// # Errors
     /// Too few bins.
     pub fn new(data: &'a Data<'a, N>, settings: &'a FillSettings) -> Result<Self, FillError> {
         let task = Task::new(data, settings)?;
         Ok(Self { task })
-    }
-
-    /// How many patches there are.
-    pub fn patches(&self) -> usize {
-        self.task.cover.patches.len()
     }
 
     /// Solves the pairs of some patches with themselves and all later ones. `progress` is called with the share
@@ -115,10 +117,46 @@ where
         self.task
             .solve_pairs(patches, false, progress, &each, &done)
     }
+}
+
+impl Rows {
+    /// Of a grid, with the settings that its pairs of patches are solved with.
+    pub fn new(grid: Grid, settings: &FillSettings) -> Self {
+        Self {
+            grid,
+            cover: cover(grid, &settings.patch_sizes_deg()),
+            blend_limit: settings.blend_limit(),
+        }
+    }
+
+    /// How many patches there are.
+    pub fn patches(&self) -> usize {
+        self.cover.patches.len()
+    }
+
+    /// The bands, from the pole on: together all patches and all polar angles, each once.
+    pub fn bands(&self) -> Vec<Band> {
+        // Patches come ring by ring of patches, each from its first polar angle to its last.
+        let ring = |d: Option<&u32>| d.map_or(0, |d| *d as usize / self.grid.n_phi());
+        let rings =
+            |patch: &Patch| ring(patch.directions.first())..ring(patch.directions.last()) + 1;
+        let mut bands: Vec<Band> = Vec::new();
+        for (number, patch) in self.cover.patches.iter().enumerate() {
+            let rings = rings(patch);
+            match bands.last_mut() {
+                Some(band) if band.rings == rings => band.patches.end = number + 1,
+                _ => bands.push(Band {
+                    patches: number..number + 1,
+                    rings,
+                }),
+            }
+        }
+        bands
+    }
 
     /// Whether something may be what the pairs of a patch give at their corners.
-    pub fn is_of_patch(&self, patch: usize, at_corners: &AtCorners<N>) -> bool {
-        let Some(later) = self.task.cover.patches.get(patch..) else {
+    pub fn is_of_patch<const N: usize>(&self, patch: usize, at_corners: &AtCorners<N>) -> bool {
+        let Some(later) = self.cover.patches.get(patch..) else {
             return false;
         };
         let of_later: usize = later.iter().map(|q| q.corners.len()).sum();
@@ -127,8 +165,8 @@ where
     }
 
     /// Averages at the corners, of all patches in their order, each [as it must be](Self::is_of_patch).
-    pub fn corners(&self, of_patches: Vec<AtCorners<N>>) -> Corners<N> {
-        self.task.corners(of_patches)
+    pub fn corners<const N: usize>(&self, of_patches: Vec<AtCorners<N>>) -> Corners<N> {
+        Corners::new(&self.cover, of_patches, self.blend_limit)
     }
 
     /// Makes all rows of lights in some patches, and gives each to `take`, in no order and from several threads.
@@ -136,7 +174,7 @@ where
     ///
     /// # Errors
     /// The first of `take`'s or `kept`'s; cancelled.
-    pub fn each_row<K: KeptCells<N>>(
+    pub fn each_row<K: KeptCells<N>, const N: usize>(
         &self,
         patches: Range<usize>,
         corners: &Corners<N>,
@@ -165,8 +203,8 @@ where
     }
 
     /// Where among the kept cells of each patch those of its pairs begin.
-    fn places(&self, corners: &Corners<N>) -> Vec<Vec<usize>> {
-        let patches = &self.task.cover.patches;
+    fn places<const N: usize>(&self, corners: &Corners<N>) -> Vec<Vec<usize>> {
+        let patches = &self.cover.patches;
         let of_patch = |p: usize| {
             let mut place = 0;
             let of_pair = |q: usize| {
@@ -181,7 +219,7 @@ where
         (0..patches.len()).map(of_patch).collect()
     }
 
-    fn rows_of_patch<K: KeptCells<N>>(
+    fn rows_of_patch<K: KeptCells<N>, const N: usize>(
         &self,
         work: &mut Work<N>,
         p: usize,
@@ -190,8 +228,8 @@ where
         kept: &K,
         take: TakeRow<'_, N, K::Error>,
     ) -> Result<(), K::Error> {
-        let patches = &self.task.cover.patches;
-        let (n, n_phi) = (self.task.grid.n_directions(), self.task.grid.n_phi());
+        let patches = &self.cover.patches;
+        let (n, n_phi) = (self.grid.n_directions(), self.grid.n_phi());
         let lights = &patches[p].directions;
         let mut rows: [Vec<f32>; N] = std::array::from_fn(|_| vec![0.0f32; lights.len() * n]);
         for q in 0..patches.len() {
@@ -222,18 +260,18 @@ where
 
     /// Writes the cells of lights in patch `p` and views in patch `q`, of which the logarithms are there unless they
     /// follow from their corners.
-    fn write_pair(
+    fn write_pair<const N: usize>(
         &self,
         work: &mut Work<N>,
         (p, q): (usize, usize),
         corners: &Corners<N>,
         rows: &mut [Vec<f32>; N],
     ) {
-        let patches = &self.task.cover.patches;
-        let n = self.task.grid.n_directions();
+        let patches = &self.cover.patches;
+        let n = self.grid.n_directions();
         let (first, second) = (p.min(q), p.max(q));
         corners.blend(
-            &self.task.cover,
+            &self.cover,
             (first, second),
             &mut work.logs,
             &mut work.shifts,
@@ -251,31 +289,6 @@ where
             }
         }
     }
-}
-
-/// The bands of a grid with some settings, from the pole on: together all patches and all polar angles, each once.
-pub fn bands(grid: Grid, settings: &FillSettings) -> Vec<Band> {
-    let (patches, n_phi) = (
-        cover(grid, &settings.patch_sizes_deg()).patches,
-        grid.n_phi(),
-    );
-    // Patches come ring by ring of patches, each from its first polar angle to its last.
-    let rings = |patch: &Patch| {
-        let ring = |d: Option<&u32>| d.map_or(0, |d| *d as usize / n_phi);
-        ring(patch.directions.first())..ring(patch.directions.last()) + 1
-    };
-    let mut bands: Vec<Band> = Vec::new();
-    for (number, patch) in patches.iter().enumerate() {
-        let rings = rings(patch);
-        match bands.last_mut() {
-            Some(band) if band.rings == rings => band.patches.end = number + 1,
-            _ => bands.push(Band {
-                patches: number..number + 1,
-                rings,
-            }),
-        }
-    }
-    bands
 }
 
 #[cfg(test)]
@@ -324,17 +337,18 @@ mod tests {
         let dense = fill(&data, &settings, &silent).unwrap();
         let n = grid.n_directions();
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
-        let (rows, kept) = (ByRows::new(&data, &settings).unwrap(), InMemory::default());
+        let (rows, kept) = (Rows::new(grid, &settings), InMemory::default());
+        let solver = Solver::new(&data, &settings).unwrap();
         let half = rows.patches() / 2;
         // Two that solve, and then one a band that writes.
-        let mut solved = rows.solve((0..half).collect(), &kept, &silent).unwrap();
-        let others = rows.solve((half..rows.patches()).collect(), &kept, &silent);
+        let mut solved = solver.solve((0..half).collect(), &kept, &silent).unwrap();
+        let others = solver.solve((half..rows.patches()).collect(), &kept, &silent);
         solved.extend(others.unwrap());
         let solved_right = |(p, of)| rows.is_of_patch(p, of);
         assert!(solved.iter().enumerate().all(solved_right));
         assert!(!rows.is_of_patch(1, &solved[0]));
         let corners = rows.corners(solved);
-        for band in bands(grid, &settings) {
+        for band in rows.bands() {
             let take = |light: usize, row: [&[f32]; 3]| {
                 assert!(band.rings.contains(&(light / grid.n_phi())));
                 let mut planes = planes.lock().unwrap();
@@ -376,13 +390,12 @@ mod tests {
     #[test]
     fn bands_hold_all_patches_and_all_polar_angles_once() {
         let grid = Grid::with_step_deg(2.0).unwrap();
-        let settings = FillSettings::DEFAULT;
-        let patches = cover(grid, &settings.patch_sizes_deg()).patches;
+        let rows = Rows::new(grid, &FillSettings::DEFAULT);
         let (mut patch, mut ring) = (0, 0);
-        for band in bands(grid, &settings) {
+        for band in rows.bands() {
             assert_eq!((band.patches.start, band.rings.start), (patch, ring));
             (patch, ring) = (band.patches.end, band.rings.end);
         }
-        assert_eq!((patch, ring), (patches.len(), grid.n_theta()));
+        assert_eq!((patch, ring), (rows.patches(), grid.n_theta()));
     }
 }

@@ -29,7 +29,7 @@ pub mod select;
 
 pub use blend::{AtCorners, Corners};
 pub use block::kernel::{AnyKernel, Kernel, Matern32, NewBlock, WIDTHS};
-pub use by_rows::{Band, ByRows, KeptCells, bands};
+pub use by_rows::{Band, KeptCells, Rows, Solver};
 pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};

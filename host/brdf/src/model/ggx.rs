@@ -28,22 +28,28 @@ pub struct Ggx {
     pub azimuth_deg: f64,
 }
 
+/// D G / (4 cos θi cos θv) of the widths αx and αy, with the height-correlated G; for directions whose z is not below 0.
+pub(super) fn lobe(light: Vec3, view: Vec3, h: Vec3, [alpha_x, alpha_y]: [f64; 2]) -> f64 {
+    let (ax2, ay2) = (alpha_x.powi(2), alpha_y.powi(2));
+    let k = h[0] * h[0] / ax2 + h[1] * h[1] / ay2 + h[2] * h[2];
+    let d = 1.0 / (PI * alpha_x * alpha_y * k * k);
+    let root = |w: Vec3| {
+        let wz2 = (w[2] * w[2]).max(1e-18);
+        (1.0 + (ax2 * w[0] * w[0] + ay2 * w[1] * w[1]) / wz2).sqrt()
+    };
+    // 1 + Λi + Λv = (root i + root v)/2.
+    let g = 2.0 / (root(light) + root(view));
+    let cosines = light[2].max(1e-9) * view[2].max(1e-9);
+    d * g / (4.0 * cosines)
+}
+
 impl Brdf for Ggx {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
         let (s, c) = self.azimuth_deg.to_radians().sine_cosine();
         let (light, view) = (turned(light, c, s), turned(view, c, s));
         let h = half_vector(light, view);
-        let (ax2, ay2) = (self.alpha_x.powi(2), self.alpha_y.powi(2));
-        let k = h[0] * h[0] / ax2 + h[1] * h[1] / ay2 + h[2] * h[2];
-        let d = 1.0 / (PI * self.alpha_x * self.alpha_y * k * k);
-        let root = |w: Vec3| {
-            let wz2 = (w[2] * w[2]).max(1e-18);
-            (1.0 + (ax2 * w[0] * w[0] + ay2 * w[1] * w[1]) / wz2).sqrt()
-        };
-        // 1 + Λi + Λv = (root i + root v)/2.
-        let g = 2.0 / (root(light) + root(view));
-        let cosines = light[2].max(1e-9) * view[2].max(1e-9);
-        let value = schlick(self.f0, dot(light, h)) * d * g / (4.0 * cosines);
+        let value =
+            schlick(self.f0, dot(light, h)) * lobe(light, view, h, [self.alpha_x, self.alpha_y]);
         [0, 1, 2].map(|c| self.diffuse[c] / PI + self.specular[c] * value)
     }
 }

@@ -2,18 +2,24 @@
 //! fitted by ([`crate::fit`]).
 
 pub mod ggx;
+pub mod gltf;
 pub mod kurt;
 pub mod lambert;
 pub mod material;
 pub mod microcylinder;
+pub mod openpbr;
+pub mod principled;
 pub mod shading;
 pub mod ward;
 
 pub use ggx::Ggx;
+pub use gltf::Gltf;
 pub use kurt::{Kurt, KurtLobe};
 pub use lambert::Lambert;
 pub use material::Material;
 pub use microcylinder::{Microcylinder, Reciprocal, Thread};
+pub use openpbr::OpenPbr;
+pub use principled::Principled;
 pub use ward::Ward;
 
 use crate::direction::{Vec3, normalize};
@@ -45,6 +51,14 @@ fn turned(v: Vec3, cos: f64, sin: f64) -> Vec3 {
 /// Schlick's approximation of Fresnel's reflectance.
 fn schlick(f0: f64, cos: f64) -> f64 {
     f0 + (1.0 - f0) * (1.0 - cos).clamp(0.0, 1.0).powi(5)
+}
+
+/// Fresnel's unpolarised reflectance of a dielectric of this index, at least 1.
+fn dielectric(cos: f64, index: f64) -> f64 {
+    let cos_t = (1.0 - (1.0 - cos * cos) / (index * index)).max(0.0).sqrt();
+    let s = (cos - index * cos_t) / (cos + index * cos_t);
+    let p = (cos_t - index * cos) / (cos_t + index * cos);
+    0.5 * (s * s + p * p)
 }
 
 /// What every model is held to.

@@ -2,7 +2,7 @@
 
 use crate::FileError;
 use crate::format::ReadForeign;
-use gonia_brdf::Sample;
+use gonia_brdf::{Direction, Sample};
 use gonia_rig::{DenseChannels, DenseFile, Remark};
 use std::fmt;
 use std::path::Path;
@@ -94,6 +94,14 @@ pub enum How {
         /// Reads it.
         read: fn(&Path) -> Result<Vec<Sample>, FileError>,
     },
+    /// Some nodes of the table, in any channels.
+    Points {
+        /// Writes a file whole, at a resolution: the values, and their standard uncertainties where they are known (of
+        /// the same channels and grid).
+        write: WritePoints,
+        /// Reads it.
+        read: fn(&Path) -> Result<Vec<Point>, FileError>,
+    },
     /// The table itself.
     Table {
         /// Writes a file whole: the table, and its standard uncertainties where they are known (the same
@@ -109,6 +117,25 @@ pub type WriteColours = fn(&Path, &DenseFile, &ExportSettings) -> Result<Vec<Rem
 
 /// Writes a table whole, with its standard uncertainties.
 pub type WriteTable = fn(&Path, &DenseChannels, Option<&DenseChannels>) -> Result<(), FileError>;
+
+/// Writes nodes of a table whole, with their standard uncertainties; what is to be said of the file comes back.
+pub type WritePoints =
+    fn(&Path, &DenseChannels, Option<&DenseChannels>, usize) -> Result<Vec<Remark>, FileError>;
+
+/// A value at a pair of directions in a channel, with its standard uncertainty where that is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Towards the light.
+    pub light: Direction,
+    /// Towards the viewer.
+    pub view: Direction,
+    /// Number of the channel.
+    pub channel: usize,
+    /// The BRDF.
+    pub value: f64,
+    /// Its standard uncertainty, in the same unit.
+    pub uncertainty: Option<f64>,
+}
 
 /// A number that the size of a file, and with it its error, is chosen by.
 pub struct Resolution {

@@ -3,15 +3,17 @@
 //! A new format is one file that defines an [`ExportFormat`], and one row in [`EXPORTS`]; the book's table is made
 //! of them.
 
+pub(crate) mod bird;
 mod dataset;
 mod folder;
 pub(crate) mod format;
 #[cfg(test)]
-mod lopsided;
+pub(crate) mod lopsided;
 mod merl;
 mod netcdf;
-mod pab;
+pub(crate) mod pab;
 pub(crate) mod radiance;
+mod speos;
 mod utia;
 mod zarr;
 mod zarr_rings;
@@ -19,24 +21,26 @@ pub(crate) mod zemax;
 
 pub(crate) use dataset::{channels_of, scale_of};
 pub use folder::check_new_folder;
-pub use format::{ExportFormat, ExportSettings, Holds, How, Meaning, Resolution};
+pub use format::{ExportFormat, ExportSettings, Holds, How, Meaning, Point, Resolution};
 pub use zarr_rings::ZarrRings;
 
 use crate::{FileError, rgl, table};
 use std::path::Path;
 
 /// Every format that is exported. Of several with one ending the first is written where no name is given.
-pub static EXPORTS: [&ExportFormat; 10] = [
+pub static EXPORTS: [&ExportFormat; 12] = [
     &rgl::EXPORT,
     &radiance::TENSOR_TREE_4,
     &radiance::TENSOR_TREE_3,
     &radiance::KLEMS,
     &pab::EXPORT,
     &zemax::EXPORT,
+    &speos::EXPORT,
     &netcdf::EXPORT,
     &zarr::EXPORT,
     &merl::EXPORT,
     &utia::EXPORT,
+    &bird::EXPORT,
 ];
 
 /// The format that a dense BRDF is exported in: by `name` on the command line, or else by the ending of

@@ -6,9 +6,10 @@
 use super::folder::write_whole_folder;
 use super::{ExportFormat, ExportSettings, Holds, How, Meaning, Resolution};
 use crate::FileError;
+use crate::format::{Content, ForeignContent, ForeignFormat, Format};
 use crate::text_file::read_text;
 use gonia_brdf::{Direction, Sample};
-use gonia_rig::{DenseFile, Remark};
+use gonia_rig::{DenseFile, Remark, Scale};
 use std::fmt::Write;
 use std::io;
 use std::path::Path;
@@ -32,6 +33,20 @@ pub(super) static EXPORT: ExportFormat = ExportFormat {
     }),
     step_deg: |rings| LAST_DEG / (rings.max(2) - 1) as f64,
     how: How::Samples { write, read },
+};
+
+/// How it is imported: a file an incidence or a folder of them, with the ending `.pab`.
+pub(crate) static FORMAT: Format = Format {
+    name: "pab text",
+    endings: &["pab"],
+    magic: &[],
+    content: Content::Foreign(ForeignFormat {
+        name: "pab text (pgII)",
+        content: ForeignContent::Samples {
+            scale: Some(Scale::Absolute),
+            read,
+        },
+    }),
 };
 
 /// Polar angle of the last ring of incidences.
@@ -101,13 +116,20 @@ fn text(file: &DenseFile, light: Direction) -> String {
     text
 }
 
-/// Reads a folder of such files, in the order of their names.
+/// Reads a folder of such files, in the order of their names, or one of them.
 ///
 /// # Errors
 /// One line naming the file and the line: what is no number, a direction that is not above the surface, a file without
 /// an incidence.
 pub(crate) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     let failed = |error: io::Error| FileError::reading(path, &error);
+    if path.is_file() {
+        let mut samples = read_file(path)?;
+        for sample in &mut samples {
+            *sample = sample.in_frame(0);
+        }
+        return not_empty(path, samples);
+    }
     let entries: io::Result<Vec<_>> = std::fs::read_dir(path).map_err(failed)?.collect();
     let mut files: Vec<_> = entries.map_err(failed)?.iter().map(|e| e.path()).collect();
     files.sort();
@@ -115,6 +137,18 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Sample>, FileError> {
     for (frame, file) in files.iter().enumerate() {
         let read = read_file(file)?;
         samples.extend(read.into_iter().map(|sample| sample.in_frame(frame as u32)));
+    }
+    not_empty(path, samples)
+}
+
+fn not_empty(path: &Path, samples: Vec<Sample>) -> Result<Vec<Sample>, FileError> {
+    if samples.is_empty() {
+        let problem = "holds no row of a measurement";
+        return Err(FileError::new(
+            path,
+            problem,
+            "give the text files of one sample",
+        ));
     }
     Ok(samples)
 }

@@ -3,7 +3,7 @@
 //! corners, and those of the other cells (f32, channel by channel).
 
 use super::bytes::Bytes;
-use crate::floats::{floats_of, to_bytes};
+use crate::floats::{floats_of, write_bytes};
 use crate::read_at::read_exact_at;
 use crate::{FileError, write_whole};
 use gonia_brdf::interpolate::AtCorners;
@@ -36,8 +36,8 @@ pub fn write_solved<const N: usize>(
         }
         let smooth: Vec<u8> = at_corners.smooth.iter().map(|is| u8::from(*is)).collect();
         out.write_all(&smooth)?;
-        out.write_all(&to_bytes(at_corners.values.as_flattened()))?;
-        out.write_all(&to_bytes(cells.as_flattened()))
+        write_bytes(at_corners.values.as_flattened(), |_, b| out.write_all(b))?;
+        write_bytes(cells.as_flattened(), |_, b| out.write_all(b))
     })
 }
 

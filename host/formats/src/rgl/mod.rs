@@ -3,10 +3,11 @@
 //! For each direction of the light (P azimuths, T polar angles) f·cosθv stands on a square of R × R
 //! places. A place u of the half vector m is (√(2θm/π), (φm + π)/2π); the density `vndf` over u says where
 //! places lie close: s = its running integral at u, and f·cosθv = rgb(s)·ndf(u)/(4·sigma(u of the light)).
-//! Written here, vndf and ndf are 1 and sigma ¼, so that s = u and `rgb` is f·cosθv itself. `luminance` is the density over s by which
-//! a renderer chooses directions.
+//! Written here, vndf is 1 and sigma ¼, so that s = u and `rgb` is f·cosθv over `ndf`, a shape that all lights share. `luminance` is
+//! the density over s by which a renderer chooses directions.
 
 mod read;
+mod shape;
 mod tensor_file;
 mod warp;
 mod write;
@@ -80,6 +81,67 @@ mod tests {
             let shine = (-self.0 * (1.0 - (light[2] + view[2]) / half.sqrt())).exponential();
             let both = lobe(light) * lobe(view);
             [0.1 * both + shine, 0.2 * both + shine, 0.3 * both + shine]
+        }
+    }
+
+    /// Quantiles of |ln| of a file against its function, or against its table.
+    fn errors(path: &std::path::Path, file: &DenseFile, model: Option<&Lopsided>) -> [f64; 2] {
+        let read = read::read(path).unwrap();
+        let mut errors = Vec::new();
+        for k in 0..4000 {
+            let angle = |by: f64, range: f64| (f64::from(k) * by).fract() * range;
+            let light = Direction::from_deg(angle(0.618_034, 75.0), angle(0.754_878, 360.0));
+            let mut view = Direction::from_deg(angle(0.569_84, 75.0), angle(0.438_58, 360.0));
+            // Every other one near the mirror's direction.
+            if k % 2 == 0 {
+                let near = |by: f64| 12.0 * (angle(by, 1.0) - 0.5);
+                view = Direction::from_deg(
+                    (light.theta_deg() + near(0.71)).abs(),
+                    light.phi_deg() + 180.0 + near(0.37),
+                );
+            }
+            let table = file.brdf.lookup(light, view).map(f64::from);
+            let [light, view] = [light, view].map(Direction::to_vec3);
+            let wanted = model.map_or(table, |model| model.eval(light, view));
+            let found = read.eval(light, view);
+            errors.extend((0..3).map(|c| (found[c] / wanted[c]).natural_log().abs()));
+        }
+        errors.sort_by(f64::total_cmp);
+        [0.5, 0.99].map(|share| errors[(share * errors.len() as f64) as usize])
+    }
+
+    #[test]
+    fn a_shape_of_all_lights_makes_a_small_file_of_a_sharp_material_nearer() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("sharp.bsdf");
+        let table = |step_deg, sharpness| DenseFile {
+            brdf: DenseBrdf::tabulate(Grid::with_step_deg(step_deg).unwrap(), &Lopsided(sharpness)),
+            scale: Scale::Absolute,
+            provenance: BTreeMap::new(),
+        };
+        let (sharp, soft) = (table(3.0, 400.0), table(4.0, 10.0));
+        let function = Lopsided(10.0);
+        // The table of the sharp one is another function between its nodes.
+        for (file, model, side, gains) in [
+            (&sharp, None, 12, [0.8, 0.8]),
+            (&sharp, None, 16, [0.8, 0.9]),
+            (&soft, None, 16, [1.0, 1.0]),
+            (&soft, Some(&function), 16, [1.0, 1.0]),
+        ] {
+            write::write_with(&path, file, side, &shape::Shape::flat()).unwrap();
+            let flat = errors(&path, file, model);
+            let settings = ExportSettings {
+                resolution: side,
+                ..SETTINGS
+            };
+            write::write(&path, file, &settings).unwrap();
+            let shaped = errors(&path, file, model);
+            for k in 0..2 {
+                assert!(
+                    shaped[k] <= gains[k] * flat[k],
+                    "{side}: {flat:?} {shaped:?}"
+                );
+            }
         }
     }
 

@@ -45,7 +45,7 @@ pub enum Made {
     /// An interpolation: its name, and its table with scale and provenance.
     Filled(String, DenseFile),
     /// A model fitted to the measurement, and the scale of its table.
-    Fitted(FitResult, Scale),
+    Fitted(Box<FitResult>, Scale),
 }
 
 /// A coarser grid leaves nothing to interpolate.
@@ -161,7 +161,7 @@ impl Measurement {
             StandardFamily::Sadeghi { scaled: false },
         ] {
             let (row, result) = self.fitted(family, &options.fits, progress)?;
-            keep(row, Made::Fitted(result, self.dense.scale))?;
+            keep(row, Made::Fitted(Box::new(result), self.dense.scale))?;
         }
         Ok(comparison)
     }

@@ -13,9 +13,9 @@ use super::prepared::Prepared;
 use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::provenance::Provenance;
+use gonia_brdf::interpolate::fill::MIN_BINS;
 use gonia_brdf::interpolate::{
-    AnyKernel, AtCorners, Band, ByRows, FillError, FillSettings, KeptCells, NewBlock, bands,
-    fill::MIN_BINS,
+    AnyKernel, AtCorners, Band, FillError, FillSettings, KeptCells, NewBlock, Rows, Solver,
 };
 use gonia_brdf::{Bins, Grid};
 use gonia_formats::export::{ZarrRings, check_new_folder};
@@ -124,7 +124,7 @@ impl FillInParts {
     }
 
     fn of(folder: PartsFolder, plan: FillPlan) -> Self {
-        let bands = bands(plan.grid, &plan.settings);
+        let bands = Rows::new(plan.grid, &plan.settings).bands();
         Self {
             folder,
             plan,
@@ -229,14 +229,14 @@ impl FillInParts {
         }
         let bins: Bins<N> = read_bins(&self.folder.bins(group), self.plan.grid)?;
         let data = sorted(&bins, self.plan.settings, progress)?;
-        let rows = ByRows::new(&data, &self.plan.settings)?;
+        let solver = Solver::new(&data, &self.plan.settings)?;
         let kept = InFolder::<N> {
             folder: &self.folder,
             group,
             patches: Vec::new(),
         };
         step(progress, Step::FittingBlocks, |share| {
-            rows.solve(missing, &kept, share)
+            solver.solve(missing, &kept, share)
         })?;
         Ok(())
     }
@@ -246,16 +246,11 @@ impl FillInParts {
         group: usize,
         band: &Band,
         progress: &Progress<'_>,
-    ) -> Result<(), Error>
-    where
-        dyn AnyKernel: NewBlock<N>,
-    {
+    ) -> Result<(), Error> {
         let (grid, fresh) = (self.plan.grid, self.fresh(group));
         let channels: Vec<usize> = fresh.iter().map(|(_, channel)| *channel).collect();
         let writer = ZarrRings::of(&self.folder.table(), grid, band.rings.clone(), &channels)?;
-        let bins: Bins<N> = read_bins(&self.folder.bins(group), grid)?;
-        let data = sorted(&bins, self.plan.settings, progress)?;
-        let rows = ByRows::new(&data, &self.plan.settings)?;
+        let rows = Rows::new(grid, &self.plan.settings);
         let mut kept = InFolder {
             folder: &self.folder,
             group,

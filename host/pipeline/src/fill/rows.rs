@@ -13,7 +13,7 @@ use crate::progress::{Progress, Step, step};
 use crate::provenance::Provenance;
 use crate::warnings::{self, AlbedoRows, DirectionalAlbedo};
 use gonia_brdf::interpolate::{
-    AnyKernel, AtCorners, ByRows, Data, FillSettings, KeptCells, NewBlock,
+    AnyKernel, AtCorners, Data, FillSettings, KeptCells, NewBlock, Rows, Solver,
 };
 use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Grid};
@@ -267,11 +267,12 @@ fn write_group<const N: usize>(
 where
     dyn AnyKernel: NewBlock<N>,
 {
-    let rows = ByRows::new(known, settings).map_err(Error::from)?;
+    let solver = Solver::new(known, settings).map_err(Error::from)?;
+    let rows = Rows::new(known.bins().grid(), settings);
     let all = 0..rows.patches();
     let kept = OnDisk::beside(path, rows.patches())?;
     let of_patches = step(progress, Step::FittingBlocks, |share| {
-        rows.solve(all.clone().collect(), &kept, share)
+        solver.solve(all.clone().collect(), &kept, share)
     })?;
     let corners = rows.corners(of_patches);
     step(progress, Step::InterpolatingAndWriting, |share| {
