@@ -11,7 +11,7 @@ mod mark;
 mod prior;
 
 use crate::IdealLight;
-use crate::hough::{StripLine, strongest_line};
+use crate::hough::{LineEdges, StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES, rows_of_strips};
 use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
 use crate::turn::Turn;
@@ -369,11 +369,13 @@ impl Registrar {
         frame: &Frame,
         strips: &[LineStrip; 4],
         search_px: f64,
+        edges: LineEdges,
     ) -> [Option<StripLine>; 4] {
         let half_width = 0.5 * self.target.line_width_mm;
+        let bins = self.hough_resolution;
         strips
             .each_ref()
-            .map(|strip| strongest_line(frame, strip, half_width, search_px, self.hough_resolution))
+            .map(|strip| strongest_line(frame, strip, half_width, search_px, bins, edges))
     }
 
     fn solve(&self, shot: &Shot<'_>, predicted: &Homography) -> Result<Solution, Failure> {
@@ -389,7 +391,7 @@ impl Registrar {
         }
         let search_px = SEARCH_WIDTHS * width + 4.0;
         let strips = self.strips(shot, predicted, search_px);
-        let hough = self.hough(shot.frame, &strips, search_px);
+        let hough = self.hough(shot.frame, &strips, search_px, LineEdges::Together);
         self.search(view, &strips, hough).or_else(|failure| {
             // A striped fabric may have lines of its own, stronger than the fiducial lines beside them.
             let again = self.search(view, &strips, [None; 4]);

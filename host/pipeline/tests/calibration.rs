@@ -63,6 +63,49 @@ fn a_calibrated_rig_is_calibrated_again_to_the_same() {
     assert!(once.changes[0].p95 > 0.2, "{:?}", once.changes);
 }
 
+/// A renderer's frames have no noise, and its arms stand where they read.
+#[test]
+fn frames_without_noise_show_the_light() {
+    for jitter_deg in [0.0, 0.01] {
+        let truth = crooked(240, 0.5, 21);
+        let scatter = Scatter {
+            jitter_deg,
+            noise: 0.0,
+            beam: false,
+            gloss: 0.0,
+            seed: 7,
+        };
+        let rows = random_rows(Role::Reference, 30, 1);
+        let found = run(&Rendered::scattered(&truth, rows, &scatter), 240).unwrap();
+        let said = describe(&found, &truth);
+        let [light, view] = errors(&found.rig, &truth);
+        assert!(matches!(found.light, LightState::Found { .. }), "{said}");
+        assert!(light[1] < 0.02 && view[1] < 0.01, "{said}");
+    }
+}
+
+/// At 200 pixels a fiducial line is thinner than a pixel, and the edge of the material beside it as plain as both
+/// of its own.
+#[test]
+fn a_rig_that_is_off_in_everything_by_all_that_is_allowed_is_found_from_frames_of_200_px() {
+    let truth = crooked(200, 1.0, 1002);
+    let scatter = Scatter {
+        jitter_deg: 0.02,
+        noise: 0.01,
+        beam: false,
+        gloss: 0.0,
+        seed: 2,
+    };
+    let rows = random_rows(Role::Reference, 40, 2);
+    let found = run(&Rendered::scattered(&truth, rows, &scatter), 200).unwrap();
+    let said = describe(&found, &truth);
+    let [light, view] = errors(&found.rig, &truth);
+    assert_eq!(found.frames, [40, 40], "{said}");
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+    assert!(matches!(found.light, LightState::Found { .. }), "{said}");
+    assert!(light[1] < 0.03 && view[1] < 0.015, "{said}");
+}
+
 #[test]
 fn without_a_reference_the_light_stays_and_is_said_to() {
     let truth = somewhat_off(6);

@@ -5,6 +5,7 @@ use super::{
     Estimate, MAX_SURPRISE, MIN_LINES, NEAR_WIDTHS, Registrar, RegistrationFailure, SEARCH_WIDTHS,
     Shot, Trust,
 };
+use crate::hough::LineEdges;
 use crate::lines::LineStrip;
 use crate::refine::{LineFit, Starts, fit_lines};
 use crate::turn::Turn;
@@ -109,7 +110,12 @@ impl Registrar {
             roll: guess.roll,
             ..CameraShift::default()
         };
-        let found = self.elsewhere(shot, predicted, within_widths, (&trust, &moved))?;
+        let found = self.elsewhere(
+            shot,
+            predicted,
+            (within_widths, LineEdges::Together),
+            (&trust, &moved),
+        )?;
         Some(found.estimate.shift)
     }
 
@@ -119,13 +125,13 @@ impl Registrar {
         &self,
         shot: &Shot<'_>,
         predicted: &Homography,
-        within_widths: f64,
+        (within_widths, edges): (f64, LineEdges),
         (trust, taken): (&Trust, &dyn Fn(CameraShift) -> CameraShift),
     ) -> Option<Elsewhere> {
         let (view, width) = (shot.view, shot.frame.width as f64);
         let search_px = within_widths * width + 4.0;
         let strips = self.strips(shot, predicted, search_px);
-        let hough = self.hough(shot.frame, &strips, search_px);
+        let hough = self.hough(shot.frame, &strips, search_px, edges);
         let lines = fit_lines(&strips, &Starts::Around(hough), &self.target).lines;
         // One of them may be something else's.
         let choices = (0..=4).map(|out| {

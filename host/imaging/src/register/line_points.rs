@@ -3,6 +3,7 @@
 
 use super::elsewhere::Elsewhere;
 use super::{MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
+use crate::hough::LineEdges;
 use crate::lines::SIDES;
 use crate::refine::{Starts, fit_lines, pieces};
 use gonia_brdf::{Elementary, Pose};
@@ -56,7 +57,8 @@ impl Registrar {
             Search::Far | Search::Aside | Search::About => {
                 let (windows, trust) = loose(search, width);
                 let found = windows.iter().find_map(|widths| {
-                    self.elsewhere(&shot, &predicted, *widths, (&trust, &|all| all))
+                    let sought = (*widths, LineEdges::Both);
+                    self.elsewhere(&shot, &predicted, sought, (&trust, &|all| all))
                 });
                 let Some(Elsewhere { strips, fit, .. }) = found else {
                     return Vec::new();

@@ -126,6 +126,7 @@ fn lines_in_a_photograph_are_found_from_corners_pointed_at_by_hand() {
                 0.5 * TARGET.line_width_mm,
                 search_px,
                 HOUGH_RESOLUTION,
+                LineEdges::Together,
             )
         });
         let fit = fit_lines(&strips, &Starts::Around(hough), &TARGET);

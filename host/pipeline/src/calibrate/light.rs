@@ -22,8 +22,9 @@ const FEWEST: usize = 6;
 const NOT_AS_THOUGHT: f64 = 0.02;
 /// A light that shading draws so many standard deviations from the mirror's contradicts it.
 const CONTRADICTS: f64 = 4.0;
-/// A frame's noise is seen in itself; the residuals' factor is found, and only zero makes no sense.
-const LEAST_FACTOR: f64 = 1e-6;
+/// A frame's noise is seen in itself. Values that fit better than that noise do not lower it: of frames without
+/// noise the model's own errors would be all that pulls.
+const LEAST_FACTOR: f64 = 1.0;
 /// Values within a frame may differ by so many times their noise, however large that is.
 const NOISES: f64 = 3.0;
 

@@ -58,6 +58,26 @@ pub struct LineFrame {
     pub points: Vec<LinePoint>,
 }
 
+/// The fewest lines that show how large the target is seen: two of them are opposite.
+const SHOW_SIZE: usize = 3;
+
+impl LineFrame {
+    /// How many of the four lines it shows.
+    pub fn lines_shown(&self) -> usize {
+        let mut shown = [false; 4];
+        for point in &self.points {
+            shown[2 * point.axis + usize::from(point.sign > 0.0)] = true;
+        }
+        shown.into_iter().filter(|shown| *shown).count()
+    }
+
+    /// Whether it shows how large the target is seen. Two lines that cross are where they should be for a camera
+    /// further away too that sees a larger target about their crossing.
+    pub fn shows_size(&self) -> bool {
+        self.lines_shown() >= SHOW_SIZE
+    }
+}
+
 /// Pieces of lines in frames of a rig.
 pub struct Lines<'a> {
     /// The rig whose numbers are replaced.

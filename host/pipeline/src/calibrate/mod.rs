@@ -146,7 +146,8 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let mut remarks = seen.remarks;
     remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
     remarks.extend(light.remark());
-    remarks.extend(few_shown(looked_at, lines.len()));
+    let shown = lines.iter().filter(|frame| frame.shows_size()).count();
+    remarks.extend(few_shown(looked_at, shown));
     let found = light.rig(&with_camera);
 
     let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();

@@ -86,7 +86,8 @@ fn polished(
             break;
         }
         let camera = agreed(rig, &seen)?;
-        let frames = seen.iter().filter(|frame| fits(&camera, frame)).count();
+        let bears_out = |frame: &&LineFrame| frame.shows_size() && fits(&camera, frame);
+        let frames = seen.iter().filter(bears_out).count();
         if frames <= best.frames {
             break;
         }

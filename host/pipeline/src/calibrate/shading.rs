@@ -12,12 +12,14 @@ use gonia_rig::{CameraModel, Rig};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Standard deviations of a frame's own numbers: the light arm's θ and φ (degrees: what encoders keep), and
-/// the logarithm of the lamp's intensity.
-pub const OWN: [f64; 3] = [0.03, 0.03, 0.01];
+/// Standard deviations of a frame's own numbers: the light arm's θ and φ (degrees: what encoders keep), the
+/// logarithm of the lamp's intensity, and how far its points lie from where its lines put them (pixels: across the
+/// camera's line of sight and along it). At a grazing view a pixel is centimetres of the target: what moves the
+/// lines there by hundredths of a pixel would be taken for a light that stands elsewhere.
+pub const OWN: [f64; 5] = [0.03, 0.03, 0.01, 0.02, 0.02];
 
-/// The least that they are taken to be: no arm repeats better, and no lamp.
-pub const LEAST_OWN: [f64; 3] = [0.005, 0.005, 1e-4];
+/// The least that they are taken to be: no arm repeats better, no lamp, and no line is placed better.
+pub const LEAST_OWN: [f64; 5] = [0.005, 0.005, 1e-4, 0.002, 0.002];
 
 /// The index of the logarithm of the lamp's intensity, behind the light's and the target's numbers.
 pub const LN_INTENSITY: usize = LIGHT.len() + TARGET;
@@ -62,6 +64,8 @@ pub struct ShadedFrame {
     points: Vec<ShadedPoint>,
     /// Relative noise of a value, from how neighbours differ.
     noise: f64,
+    /// A pixel on the target, mm: across the camera's line of sight, and along it.
+    pixel_mm: [[f64; 2]; 2],
 }
 
 /// Values of the reference in frames of a rig. The shared numbers are those of the light, those of the
@@ -205,9 +209,13 @@ impl ShadedFrame {
                 ln,
             });
         }
-        (points.len() >= FEWEST_POINTS).then(|| Self {
+        if points.len() < FEWEST_POINTS {
+            return None;
+        }
+        Some(Self {
             light: reading,
             noise: noise_of(&row),
+            pixel_mm: pixel_mm(rig, points[points.len() / 2].to_camera),
             points,
         })
     }
@@ -240,17 +248,21 @@ impl ShadedFrame {
     /// RMS of ln radiance about what light and reference make of it, for shared numbers of a [`Shading`].
     pub fn misfit(&self, (rig, rest): &(Rig, Vec<f64>)) -> f64 {
         let light = IdealLight::new(rig, self.light);
-        let off = self.off(&light, rest);
+        let off = self.off(&light, rest, [0.0; 2]);
         (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt()
     }
 
-    /// ln radiance minus what light and reference make of it; `rest` are intensity and coefficients.
-    fn off(&self, light: &IdealLight, rest: &[f64]) -> Vec<f64> {
+    /// ln radiance minus what light and reference make of it; `rest` are intensity and coefficients, `shift_px` how
+    /// far the points lie from where they seem to.
+    fn off(&self, light: &IdealLight, rest: &[f64], shift_px: [f64; 2]) -> Vec<f64> {
         let mut row = Vec::new();
+        let [across, along] = self.pixel_mm;
+        let shift_mm = [0, 1].map(|i| shift_px[0] * across[i] + shift_px[1] * along[i]);
         let of_point = |p: &ShadedPoint| {
-            let mut off = p.ln - ln_irradiance(light, p.at_mm) - rest[0];
+            let at_mm = [0, 1].map(|i| p.at_mm[i] + shift_mm[i]);
+            let mut off = p.ln - ln_irradiance(light, at_mm) - rest[0];
             if rest.len() > 1 {
-                terms(DEGREE, light.direction_from(p.at_mm), p.to_camera, &mut row);
+                terms(DEGREE, light.direction_from(at_mm), p.to_camera, &mut row);
                 // The constant, 1, is the intensity's.
                 let field = row.iter().zip(rest).skip(1);
                 off -= field
@@ -265,6 +277,24 @@ impl ShadedFrame {
 
 fn sum(rgb: [f32; 3]) -> f64 {
     f64::from(rgb.iter().sum::<f32>())
+}
+
+/// A pixel in the middle of the target, which a camera in this direction sees, mm: across the line of sight, and
+/// along it where that is foreshortened.
+fn pixel_mm(rig: &Rig, to_camera: Vec3) -> [[f64; 2]; 2] {
+    let pixel_mm = 1000.0 * rig.camera.distance_m / rig.camera.focal_px;
+    let [x, y, height] = to_camera;
+    let sine = x.hypotenuse(y);
+    // From straight above no direction is another.
+    let along = match sine > 0.0 {
+        true => [x / sine, y / sine],
+        false => [1.0, 0.0],
+    };
+    let foreshortened_mm = pixel_mm / height.max(LOWEST_COSINE);
+    [
+        [-along[1] * pixel_mm, along[0] * pixel_mm],
+        along.map(|way| way * foreshortened_mm),
+    ]
 }
 
 /// Noise by the second differences of neighbours in a row of the grid: shading has next to none.
@@ -350,7 +380,7 @@ impl Frames for Shading<'_> {
             phi: frame.light.phi + own[1].to_radians(),
         };
         let light = IdealLight::new(rig, reading);
-        let mut off = frame.off(&light, rest);
+        let mut off = frame.off(&light, rest, [own[3], own[4]]);
         off.iter_mut()
             .for_each(|off| *off = (*off - own[2]) / frame.noise);
         off

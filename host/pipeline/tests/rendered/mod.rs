@@ -21,7 +21,7 @@ pub struct Rendered {
 pub struct Scatter {
     /// Standard deviation of the arms about their readings, degrees.
     pub jitter_deg: f64,
-    /// Shot noise of a typical pixel, relative.
+    /// Shot noise of a typical pixel, relative; 0: no noise at all.
     pub noise: f64,
     /// Whether the light has a beam.
     pub beam: bool,
@@ -59,7 +59,7 @@ impl Rendered {
             scatter.seed,
         );
         scene.beam = scatter.beam.then(Beam::default);
-        scene.noise = Some(Noise {
+        scene.noise = (scatter.noise > 0.0).then(|| Noise {
             shot: scatter.noise,
             ..Noise::default()
         });
