@@ -115,6 +115,7 @@ pub const FIGURES: &[Figure] = &[
         run("gonia chart {work}/demo/samples.npy --truth {work}/demo/truth.exr --only images --out {work}/chart"),
     ])
     .with(&[("chart/images.svg", "images.svg")]),
+    figure("symmetry", 9.0, Tables, &[run("cargo bench -p gonia --bench symmetry -- --out {work}")]),
     figure("scipy", 6.0, Tables, &[
         prepare("python/pyvenv.cfg", "python3 -m venv {work}/python"),
         run("{work}/python/bin/pip install --quiet -r bench/baselines/requirements.txt"),
@@ -204,6 +205,7 @@ pub const FIGURES: &[Figure] = &[
         run("gonia fill {work}/demo/samples.npy -o {work}/one.exr --step 1"),
     ]),
     figure("growth", 3.0, Tables, &[run("cargo bench -p gonia-brdf --bench growth")]),
+    figure("growth-few", 3.0, Tables, &[run("cargo bench -p gonia-brdf --bench growth -- --few")]),
     figure("binning", 0.4, Tables, &[run("cargo bench -p gonia-brdf --bench bins")]),
     figure("block", 0.1, Tables, &[run("cargo bench -p gonia-brdf --bench block")]),
     figure("frames", 1.0, Tables, &[run("cargo bench -p gonia --bench frames")]),
