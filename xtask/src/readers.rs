@@ -19,8 +19,9 @@ const PACKAGES: [&str; 9] = [
 ];
 
 /// Each reader's script, in `tests/readers`.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 6] = [
     "mitsuba_bsdf.py",
+    "mitsuba_sphere.py",
     "radiance_xml.py",
     "arrays.py",
     "materials.py",
