@@ -6,7 +6,9 @@ use crate::scale::ScaleArgument;
 use crate::table::{self, count};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{DenseBrdf, Grid, Sample};
-use gonia_formats::dense::{check_dense_name, write_dense};
+use gonia_formats::dense::{
+    check_dense_name, is_dense_file, read_dense_channels, write_dense, write_dense_channels,
+};
 use gonia_formats::foreign::{ForeignBrdf, ForeignContent, ForeignFormat, Gaps, foreign_format};
 use gonia_formats::samples::{SampleNote, check_sample_name, write_noted_samples};
 use gonia_formats::{FileError, check_output};
@@ -16,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// Brings a material of the UTIA database (.bin), of MERL (.binary, isotropic), of Mitsuba or Zemax (.bsdf) or of
 /// Radiance (.xml) onto gonia's grid, so that every other command can compare, fit and draw it; one of Ngan, Durand and
-/// Matusik or ALTA (.dat), of Cornell (.astm) or of a pgII (.pab), which has holes, becomes samples for `gonia fill`.
+/// Matusik or ALTA (.dat), of Cornell (.astm) or of a pgII (.pab), which has holes, becomes samples for `gonia fill`. gonia's own Zarr becomes OpenEXR.
 #[derive(clap::Args)]
 #[command(
     after_long_help = "Example:\n  gonia import fabric112.bin -o fabric112.exr\n  gonia import velvet.dat -o velvet.npy && gonia fill velvet.npy -o velvet.exr\n\nUTIA's values end at 75 degrees; beyond, the last ring's are repeated. Its files do not say whether they\nare 1/sr, and their readers disagree: they count as relative unless --scale absolute is given. Samples of other formats come\nin as CSV or .npy by `gonia fill`."
@@ -27,9 +29,9 @@ pub struct Import {
     /// The dense BRDF to write (OpenEXR), or for .dat, .astm and .pab the samples (.npy or .csv)
     #[arg(short, long, value_name = "DENSE.exr")]
     output: PathBuf,
-    /// Step of the grid in degrees
-    #[arg(long, default_value_t = 2.0, value_name = "DEG")]
-    step: f64,
+    /// Step of the grid in degrees [default: 2]
+    #[arg(long, value_name = "DEG")]
+    step: Option<f64>,
     /// What the values are, where the format does not say it (UTIA): relative, or absolute (1/sr)
     #[arg(long, value_enum)]
     scale: Option<ScaleArgument>,
@@ -38,8 +40,11 @@ pub struct Import {
 impl Import {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let grid =
-            Grid::with_step_deg(self.step).with_context(|| format!("--step {}", self.step))?;
+        if is_dense_file(&self.material)? {
+            return self.copy_dense();
+        }
+        let step = self.step.unwrap_or(2.0);
+        let grid = Grid::with_step_deg(step).with_context(|| format!("--step {step}"))?;
         let ForeignFormat { name, content, .. } = foreign_format(&self.material)?;
         match content {
             ForeignContent::Brdf { scale, read } => {
@@ -59,6 +64,31 @@ impl Import {
                 self.import_samples(name, scale, *read)
             }
         }
+    }
+
+    /// A table on gonia's grid, as Zarr say: as it is, under another name.
+    fn copy_dense(&self) -> Result<()> {
+        for (option, is_given) in [
+            ("--step", self.step.is_some()),
+            ("--scale", self.scale.is_some()),
+        ] {
+            if is_given {
+                let material = self.material.display();
+                bail!(
+                    "{option}: {material} is a dense BRDF already, and says it; leave {option} out"
+                );
+            }
+        }
+        check_dense_name(&self.output)?;
+        check_output(&self.output, &[&self.material])?;
+        let progress = Progress::new();
+        let table = progress.stage("reading the table", |_| read_dense_channels(&self.material))?;
+        write_dense_channels(&self.output, &table)?;
+        table::print(&[
+            ("scale".to_owned(), table.scale.to_string()),
+            ("written".to_owned(), self.output.display().to_string()),
+        ]);
+        Ok(())
     }
 
     /// What the values are, and the row that says so: what the format knows, or else `--scale`.

@@ -653,16 +653,25 @@ mod programs {
         degrees: &'a str,
     }
 
+    impl Airing<'_> {
+        /// In one step: the thermometer may be read at any time.
+        fn reads(&self, degrees: &str) {
+            let next = self.reading.with_extension("next");
+            std::fs::write(&next, degrees).unwrap();
+            std::fs::rename(&next, self.reading).unwrap();
+        }
+    }
+
     impl Watch for Airing<'_> {
         fn on_event(&self, event: &SessionEvent) {
             match event {
                 // Warm after the third pose.
                 SessionEvent::Pose { done, .. } if done.index == 2 => {
-                    std::fs::write(self.reading, "31.5").unwrap();
+                    self.reads("31.5");
                 }
                 SessionEvent::Note(text) => {
                     self.heard.lock().unwrap().push((*text).to_owned());
-                    std::fs::write(self.reading, self.degrees).unwrap();
+                    self.reads(self.degrees);
                 }
                 _ => {}
             }

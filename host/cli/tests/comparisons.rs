@@ -197,6 +197,38 @@ fn models_sizes_and_files_that_cannot_be_are_refused_in_a_line() {
 }
 
 #[test]
+fn a_table_of_many_processes_is_read_as_any_other_and_becomes_openexr() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let (dense, zarr, back) = (path("d.exr"), path("d.zarr"), path("b.exr"));
+    write(&dense, 15.0, &Kurt::two_thread_fabric(), Scale::Absolute);
+    gonia_ok(&["export", text(&dense), "-o", text(&zarr)], "");
+    let directions = "theta_i,phi_i,theta_v,phi_v\n31,47,55,201\n";
+    let asked = |file: &Path| gonia_ok(&["query", text(file)], directions);
+    assert_eq!(asked(&zarr), asked(&dense));
+    gonia_ok(&["import", text(&zarr), "-o", text(&back)], "");
+    let (there, here) = (read_dense(&back).unwrap(), read_dense(&dense).unwrap());
+    assert_eq!(there.brdf.planes(), here.brdf.planes());
+    assert_eq!(
+        (there.scale, there.provenance),
+        (here.scale, here.provenance)
+    );
+    for (more, word) in [
+        (["--step", "4"], "leave --step out"),
+        (["--scale", "relative"], "leave --scale out"),
+    ] {
+        let import = ["import", text(&zarr), "-o", text(&back)];
+        let said = refused(&[&import[..], &more[..]].concat(), "");
+        assert!(said.contains(word), "{said}");
+    }
+    // It is written in one piece by an export only.
+    let other = path("o.zarr");
+    let said = refused(&["import", text(&zarr), "-o", text(&other)], "");
+    assert!(said.contains("name it .exr"), "{said}");
+    assert!(!said.contains(".exr or"), "{said}");
+}
+
+#[test]
 fn renders_and_photographs_are_drawn() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);

@@ -196,6 +196,19 @@ impl DenseLookup {
     }
 }
 
+fn is_written(content: &Content) -> bool {
+    matches!(content, Content::Dense(dense) if dense.write.is_some())
+}
+
+/// Whether a file is a dense BRDF on gonia's grid, by its first bytes, else by its ending.
+///
+/// # Errors
+/// Neither tells its format, and it cannot be read.
+pub fn is_dense_file(path: &Path) -> Result<bool, FileError> {
+    let format = table::format_of_file(path)?;
+    Ok(format.is_some_and(|format| is_dense(&format.content)))
+}
+
 fn is_dense(content: &Content) -> bool {
     matches!(content, Content::Dense(_))
 }
@@ -234,7 +247,7 @@ fn writer_of_name(path: &Path) -> Result<&'static DenseWriter, FileError> {
         FileError::new(
             path,
             "has the ending of another kind of file than a dense BRDF",
-            format_args!("name it {}", table::endings(is_dense)),
+            format_args!("name it {}", table::endings(is_written)),
         )
     })
 }

@@ -252,7 +252,7 @@ fn read_any(path: &Path) -> Result<FileContent, FileError> {
     })
 }
 
-fn check_finite(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
+pub(super) fn check_finite(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
     let grid = file.grid;
     let side = grid.n_directions();
     // A row at a time without a way out: several values are looked at at once.
@@ -270,7 +270,8 @@ fn check_finite(path: &Path, file: &DenseChannels) -> Result<(), FileError> {
     Ok(())
 }
 
-fn no_value(
+/// Of a cell that has none.
+pub(super) fn no_value(
     path: &Path,
     grid: Grid,
     channel: &str,

@@ -1,6 +1,6 @@
 //! The table of all formats, and how a file's format is recognised.
 
-use crate::export::{bird, pab, radiance, zemax};
+use crate::export::{bird, pab, radiance, zarr_read, zemax};
 use crate::format::{Content, Format};
 use crate::{
     FileError, alta, astm, dense_exr, merl, ngan, rgl, samples_csv, samples_npy, samples_npz, utia,
@@ -10,7 +10,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Every format. The first one of each kind is written where a name has no known ending.
-static FORMATS: [&Format; 14] = [
+static FORMATS: [&Format; 15] = [
     &dense_exr::FORMAT,
     &samples_npy::FORMAT,
     &samples_csv::FORMAT,
@@ -25,6 +25,7 @@ static FORMATS: [&Format; 14] = [
     &astm::FORMAT,
     &pab::FORMAT,
     &bird::FORMAT,
+    &zarr_read::FORMAT,
 ];
 
 /// The formats of a kind, in the order of the table.

@@ -84,6 +84,7 @@ def test_two_workers_write_the_bytes_of_one_process_though_one_is_killed(client,
     import zarr
 
     table = zarr.open_group(str(tmp_path / "two.zarr"), mode="r")
+    assert np.array_equal(gonia.read(path).values["G"], table["brdf"][1])
     node = table["brdf"][1, 4, 6, 8, 30]
     truth = lopsided([[30.0, 45.0, 60.0, 225.0]])[0, 1]
     assert node == pytest.approx(truth, rel=0.05)

@@ -16,6 +16,7 @@ pub(crate) mod radiance;
 mod speos;
 mod utia;
 mod zarr;
+pub(crate) mod zarr_read;
 mod zarr_rings;
 pub(crate) mod zemax;
 

@@ -3,14 +3,13 @@
 //! A chunk of the values is a channel at a polar angle of the light. `.zmetadata` holds all that is said of the
 //! arrays once more, so that readers open one file.
 
-use super::dataset::{AXES, Array, Data, Dataset, PREFIX, VALUES, channels_of, dataset, scale_of};
+use super::dataset::{AXES, Array, Data, Dataset, dataset};
 use super::folder::write_whole_folder;
+use super::zarr_read::{name_of, read};
 use super::{ExportFormat, Holds, How, Meaning};
 use crate::FileError;
-use gonia_brdf::Grid;
 use gonia_rig::DenseChannels;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
@@ -132,88 +131,10 @@ fn chunks(folder: &Path, array: &Array<'_>, shape: [usize; 5]) -> io::Result<()>
     }
 }
 
-/// The chunk of a channel at a polar angle of the light.
-pub(super) fn name_of(channel: usize, theta: usize) -> String {
-    format!("{channel}.{theta}.0.0.0")
-}
-
-/// Reads the values of what [`write`] writes.
-fn read(path: &Path) -> Result<DenseChannels, FileError> {
-    read_array(path, VALUES)
-}
-
-fn read_array(path: &Path, array: &str) -> Result<DenseChannels, FileError> {
-    let misfit = |what: &str| {
-        FileError::new(
-            path,
-            format_args!("{what} is not what gonia writes"),
-            "give a table of gonia, or export it again",
-        )
-    };
-    let bytes = |name: &str| {
-        let file = path.join(name);
-        std::fs::read(&file).map_err(|error| FileError::reading(&file, &error))
-    };
-    let meta: Value =
-        serde_json::from_slice(&bytes(".zmetadata")?).map_err(|_| misfit(".zmetadata"))?;
-    let of = |name: &str| meta["metadata"].get(name).cloned().unwrap_or_default();
-    let shape: Vec<u64> = serde_json::from_value(of(&format!("{array}/.zarray"))["shape"].clone())
-        .map_err(|_| misfit("its shape"))?;
-    let &[n, n_theta, n_phi, views, _] = &shape[..] else {
-        return Err(misfit("its shape"));
-    };
-    let grid = Grid::from_directions((n_theta.min(1 << 16) * n_phi.min(1 << 16)) as usize)
-        .filter(|grid| grid.n_theta() as u64 == n_theta && views == n_theta && n > 0)
-        .ok_or_else(|| misfit("its shape"))?;
-    let letters = bytes("channel/0")?;
-    let (words, _) = letters.as_chunks::<4>();
-    let width = (words.len() / n as usize).max(1);
-    let name_of_letters = |letters: &[[u8; 4]]| -> String {
-        let letters = letters.iter().map(|w| u32::from_le_bytes(*w));
-        letters
-            .take_while(|l| *l != 0)
-            .filter_map(char::from_u32)
-            .collect()
-    };
-    let names: Vec<String> = words.chunks(width).map(name_of_letters).collect();
-    let channels = channels_of(&names)
-        .filter(|channels| channels.count() as u64 == n)
-        .ok_or_else(|| misfit("its list of channels"))?;
-    let mut planes = vec![Vec::with_capacity(grid.n_cells()); n as usize];
-    for (c, plane) in planes.iter_mut().enumerate() {
-        for theta in 0..grid.n_theta() {
-            let name = format!("{array}/{}", name_of(c, theta));
-            let ring = bytes(&name)?;
-            let (words, rest) = ring.as_chunks::<4>();
-            if words.len() != grid.n_phi() * grid.n_directions() || !rest.is_empty() {
-                return Err(misfit(&name));
-            }
-            plane.extend(words.iter().map(|w| f32::from_le_bytes(*w)));
-        }
-    }
-    let said = of(".zattrs");
-    let facts = said.as_object().into_iter().flatten();
-    let provenance: BTreeMap<String, String> = facts
-        .filter_map(|(name, value)| {
-            let name = name.strip_prefix(PREFIX)?;
-            Some((name.to_owned(), value.as_str()?.to_owned()))
-        })
-        .collect();
-    Ok(DenseChannels {
-        channels,
-        grid,
-        planes,
-        scale: said["scale"]
-            .as_str()
-            .and_then(scale_of)
-            .ok_or_else(|| misfit("its scale"))?,
-        provenance,
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::dataset::UNCERTAINTY;
+    use super::super::dataset::{UNCERTAINTY, VALUES};
+    use super::super::zarr_read::read_array;
     use super::*;
     use crate::export::lopsided::tables;
 

@@ -4,7 +4,8 @@
 
 use super::dataset::{VALUES, dataset};
 use super::folder::check_new_folder;
-use super::zarr::{fill, name_of};
+use super::zarr::fill;
+use super::zarr_read::name_of;
 use crate::FileError;
 use crate::floats::to_bytes;
 use crate::read_at::write_all_at;
