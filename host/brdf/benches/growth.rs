@@ -108,7 +108,7 @@ fn peak_mb() -> f64 {
 const FEW: [usize; 5] = [10, 100, 1000, 10_000, 100_000];
 /// Their noise, relative.
 const NOISE: f64 = 0.01;
-/// So many pairs are asked.
+/// At so many pairs the fit is compared with the truth.
 const ASKED: usize = 2000;
 
 fn few_samples() {

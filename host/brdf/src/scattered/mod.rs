@@ -494,25 +494,25 @@ mod tests {
         assert!(with < 0.7 * without, "{with} {without}");
     }
 
+    /// Of `drawn` samples of a material that leans along x, with 0.5 % noise, the first `count` with azimuths of light and
+    /// view within a range, degrees.
+    fn leaning_within(azimuths: std::ops::Range<f32>, drawn: usize, count: usize) -> Vec<Sample> {
+        samples(drawn, false, |l, v, normal| {
+            let leaning = 1.0 + 0.3 * (l.to_vec3()[0] + v.to_vec3()[0]);
+            material(l, v, 1.4, 0.0) * leaning * (1.0 + 0.005 * normal)
+        })
+        .into_iter()
+        .filter(|s| azimuths.contains(&s.phi_i_deg) && azimuths.contains(&s.phi_v_deg))
+        .take(count)
+        .collect()
+    }
+
     #[test]
     fn a_plane_of_which_one_side_was_measured_is_not_taken() {
         // Tilted fibres: a plane along x, far from which nothing is alike; lights and views on one side of it, and in one
         // quarter of azimuths.
-        let value = |l: Direction, v: Direction| {
-            material(l, v, 1.4, 0.0) * (1.0 + 0.3 * (l.to_vec3()[0] + v.to_vec3()[0]))
-        };
         for (low, high) in [(0.0, 180.0), (20.0, 110.0)] {
-            let of_side: Vec<Sample> = samples(9000, false, |l, v, normal| {
-                value(l, v) * (1.0 + 0.005 * normal)
-            })
-            .into_iter()
-            .filter(|s| {
-                [s.phi_i_deg, s.phi_v_deg]
-                    .iter()
-                    .all(|phi| (low..high).contains(phi))
-            })
-            .take(700)
-            .collect();
+            let of_side = leaning_within(low..high, 9000, 700);
             let far_off = |fit: &ScatteredFit| {
                 let plane = fit.choice().settings.symmetry.plane();
                 let off = |p: crate::symmetry::MirrorPlane| (p.azimuth_deg() + 90.0) % 180.0 - 90.0;
@@ -533,21 +533,8 @@ mod tests {
     #[test]
     fn half_a_turn_of_which_one_side_was_measured_is_not_taken() {
         // A wave along x, which half a turn turns over; lights and views on one side.
-        let value = |l: Direction, v: Direction| {
-            material(l, v, 1.4, 0.0) * (1.0 + 0.3 * (l.to_vec3()[0] + v.to_vec3()[0]))
-        };
         for (low, high) in [(0.0, 90.0), (20.0, 110.0)] {
-            let of_side: Vec<Sample> = samples(12000, false, |l, v, normal| {
-                value(l, v) * (1.0 + 0.005 * normal)
-            })
-            .into_iter()
-            .filter(|s| {
-                [s.phi_i_deg, s.phi_v_deg]
-                    .iter()
-                    .all(|phi| (low..high).contains(phi))
-            })
-            .take(400)
-            .collect();
+            let of_side = leaning_within(low..high, 12000, 400);
             let fit = ScatteredFit::new(&of_side, None).unwrap();
             let symmetry = fit.choice().settings.symmetry;
             assert!(!symmetry.has_half_turn(), "{low}: {symmetry}");

@@ -43,7 +43,7 @@ pub(super) fn fit_of_others(fit: &ScatteredFit, samples: &[Sample], grid: Grid) 
 /// So many of many samples, at most, are looked at for a plane of symmetry, and for what contradicts it.
 const LOOKED_AT: usize = 6000;
 
-/// The fit of samples with the symmetry that is asked for, about its plane where that is known.
+/// The fit of samples with the stated symmetry, about its plane where that is known.
 fn fit_about(samples: &[Sample], options: &FillOptions) -> Option<ScatteredFit> {
     match options.symmetry_of_plane() {
         Some((kind, plane)) => ScatteredFit::about_plane(samples, kind, plane),
@@ -51,7 +51,7 @@ fn fit_about(samples: &[Sample], options: &FillOptions) -> Option<ScatteredFit> 
     }
 }
 
-/// The symmetry of many samples that is asked for, with the plane that is known or that some of them show, and what
+/// The symmetry of many samples that is stated, with the plane that is known or that some of them show, and what
 /// these say against it.
 pub(super) fn symmetry_of_many(
     samples: &[Sample],
