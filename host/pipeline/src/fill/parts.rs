@@ -74,7 +74,11 @@ impl FillInParts {
         if PartsFolder::new(folder).plan().is_file() {
             return Self::gone_on(folder, &of);
         }
-        check_new_folder(folder)?;
+        if folder.symlink_metadata().is_ok() {
+            let problem = "is there already, and holds no fill that could go on";
+            let remedy = "remove it, or give another folder";
+            return Err(FileError::new(folder, problem, remedy).into());
+        }
         let prepared = Prepared::new(&mut samples, grid, options, progress)?;
         if prepared.fit.is_some() {
             return Ok(Begun::OneFit);

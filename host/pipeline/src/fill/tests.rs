@@ -187,6 +187,12 @@ fn a_fit_of_few_samples_is_no_work_to_share_and_a_failed_beginning_leaves_nothin
     let error = begin(few, &options(true)).unwrap_err().to_string();
     assert!(error.contains("no error bars"), "{error}");
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    // What is something else's is not touched.
+    std::fs::create_dir(&folder).unwrap();
+    let many = samples(bands(3)).of_channels([0, 1, 2]);
+    let error = begin(many, &options(false)).unwrap_err().to_string();
+    assert!(error.contains("holds no fill that could go on"), "{error}");
+    assert!(folder.is_dir());
 }
 
 #[test]
