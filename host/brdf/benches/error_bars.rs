@@ -3,7 +3,7 @@
 //! `cargo bench -p gonia-brdf --bench error_bars -- [MATERIAL …] [--sparse | --poses N [--fall]]`: the paper's plan on the
 //! 2° grid, or every tenth of its frames, or about N of them, on 4° (then of all cells of the table). It prints a table: percent in the interior, and in
 //! brackets where either θ is beyond 75°, and where the half vector is within 10° of the normal. With `--fall` how errors
-//! fall with twice the poses.
+//! fall with twice the poses; with `--cost` what uncertainties cost.
 
 #![allow(clippy::expect_used)]
 
@@ -64,6 +64,9 @@ fn main() {
         .iter()
         .position(|a| a == "--poses")
         .map(|k| arguments[k + 1].parse().expect("a number"));
+    if arguments.iter().any(|a| a == "--cost") {
+        return costs(&named(&arguments));
+    }
     if let Some(poses) = few.filter(|_| arguments.iter().any(|a| a == "--fall")) {
         return falls(&named(&arguments), poses);
     }
@@ -95,6 +98,34 @@ fn main() {
             truths(&data, &settings, &calibration, &*model)
         };
         println!("| {name} | {left_out} | {interpolated} | {measured} | {cpu:.1} |");
+    }
+}
+
+/// What uncertainties cost: CPU time of settings, calibration and fill with them, over that of settings and fill without;
+/// the 925 poses of the quick demo, on its grid of 4 degrees and on 2.
+fn costs(names: &[&str]) {
+    println!("| material | grid | without, CPU-s | with, over without |");
+    println!("|---|---|---|---|");
+    for name in names {
+        let samples = measure_with(&*material(name), NOISE, &Poses::quick());
+        for step in [4.0, 2.0] {
+            let bins = Bins::new(Grid::with_step_deg(step).expect("a grid step"), &samples);
+            let start = cpu_seconds();
+            let data = Data::new(&bins);
+            let settings = select(&data, FillSettings::DEFAULT).settings;
+            let chosen = cpu_seconds();
+            drop(gonia_brdf::interpolate::fill(&data, &settings, &silent).expect("bins"));
+            let without = cpu_seconds();
+            let calibration = Calibration::new(&data, &settings).expect("enough frames");
+            ErrorFall::measure(&data, &settings, &calibration);
+            drop(fill_with_errors(&data, &settings, &calibration, &silent).expect("bins"));
+            let with = cpu_seconds() - without + chosen - start;
+            let without = without - start;
+            println!(
+                "| {name} | {step}° | {without:.1} | {:.2} |",
+                with / without
+            );
+        }
     }
 }
 

@@ -17,7 +17,7 @@ use crate::sample::Sample;
 use rayon::prelude::*;
 
 /// Fewer tests than this are no evidence.
-const TESTS_MIN: usize = 100;
+pub(super) const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
@@ -79,6 +79,12 @@ impl<'a, const N: usize> Fold<'a, N> {
     /// their bins: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
     pub fn new(all: &'a Bins<N>, number: u32, one_in: u32, tests: usize) -> Option<Self> {
+        let fold = Self::one_of_many(all, number, one_in, tests)?;
+        (fold.tests.len() >= TESTS_MIN).then_some(fold)
+    }
+
+    /// The same however few its tests are: they count together with those of other folds.
+    pub fn one_of_many(all: &'a Bins<N>, number: u32, one_in: u32, tests: usize) -> Option<Self> {
         let bins = all.bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
         let is_left_out = |bin: &Bin<N>| {
@@ -98,7 +104,7 @@ impl<'a, const N: usize> Fold<'a, N> {
             .collect();
         let tests = pick(left_out.clone(), tests);
         let trained = training.iter().filter(|is_used| **is_used).count();
-        (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
+        (!tests.is_empty() && trained >= TESTS_MIN).then_some(Self {
             bins: all,
             training,
             left_out,

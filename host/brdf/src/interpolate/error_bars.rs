@@ -10,7 +10,7 @@
 
 use super::FillSettings;
 use super::block::kernel::{AnyKernel, NewBlock};
-use super::cross_validation::{Fold, MeanPrediction, Prediction};
+use super::cross_validation::{Fold, MeanPrediction, Prediction, TESTS_MIN};
 use super::data::Data;
 use super::datum::SIGMA_PER_MAD;
 use crate::bins::{Bin, variance_of_median};
@@ -112,12 +112,13 @@ impl Calibration {
         let mut means = Vec::new();
         for number in 0..folds {
             let number = ONE_IN - 1 - number;
-            if let Some(fold) = Fold::new(bins, number, ONE_IN, TESTS / folds as usize) {
+            let fold = Fold::one_of_many(bins, number, ONE_IN, TESTS / folds as usize);
+            if let Some(fold) = fold {
                 means.extend(fold.predict_means(data, settings));
             }
         }
         let noise_variance = settings.noise_variance;
-        (!means.is_empty()).then(|| Self::from_means(&means, noise_variance))
+        (means.len() >= TESTS_MIN).then(|| Self::from_means(&means, noise_variance))
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.

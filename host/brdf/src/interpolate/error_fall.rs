@@ -5,7 +5,7 @@
 
 use super::FillSettings;
 use super::block::kernel::{AnyKernel, NewBlock};
-use super::cross_validation::{Fold, MeanPrediction};
+use super::cross_validation::{Fold, MeanPrediction, TESTS_MIN};
 use super::data::Data;
 use super::error_bars::Calibration;
 use crate::elementary::Elementary;
@@ -15,8 +15,6 @@ use crate::quantile::weighted_quantile;
 const TESTS: usize = 3000;
 /// A fold leaves out one frame in so many.
 const ONE_IN: u32 = 24;
-/// Fewer tests of a part than this say nothing of it.
-const TESTS_MIN: usize = 100;
 /// The errors are compared that so large a share does not exceed: a standard deviation where they are normal.
 const SHARE: f32 = 0.68;
 /// Where less than this share of it is error, and the rest noise, nothing is said.
@@ -51,9 +49,8 @@ impl ErrorFall {
         let folds = Fold::number_of_many_groups(bins, ONE_IN);
         let (mut whole, mut half) = (Vec::new(), Vec::new());
         for number in 0..folds {
-            let Some(fold) = Fold::new(bins, number, ONE_IN, TESTS / folds as usize) else {
-                continue;
-            };
+            let fold = Fold::one_of_many(bins, number, ONE_IN, TESTS / folds as usize);
+            let Some(fold) = fold else { continue };
             whole.extend(fold.predict_means(data, settings));
             half.extend(fold.halved().predict_means(data, settings));
         }

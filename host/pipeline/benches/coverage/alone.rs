@@ -115,14 +115,16 @@ impl Baseline {
             let effects = cells.effects(light, view);
             let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
             let stated: Vec<f64> = of_input.map(|effect| effects.of(effect)).collect();
+            let scatter = (f64::from(noise[*cell]) / value).powi(2);
+            // Cells count by how well noise and interpolation let them be known.
+            let weight = 1.0 / scatter.max(1e-8);
             let pair = [stated[0], stated.get(1).copied().unwrap_or(0.0)];
             for j in 0..2 {
-                xy[j] += pair[j] * change;
-                (0..2).for_each(|k| xx[j][k] += pair[j] * pair[k]);
+                xy[j] += weight * pair[j] * change;
+                (0..2).for_each(|k| xx[j][k] += weight * pair[j] * pair[k]);
             }
-            yy += change * change;
+            yy += weight * change * change;
             let u: f64 = stated.iter().map(|share| share * share).sum();
-            let scatter = (f64::from(noise[*cell]) / value).powi(2);
             if u > scatter {
                 shows += 1.0;
                 within += f64::from(change.abs() <= 2.0 * (u + scatter).sqrt());
