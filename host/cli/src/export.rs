@@ -39,6 +39,9 @@ pub struct Export {
     /// Take a relative BRDF for 1/sr after multiplying it by this factor
     #[arg(long, value_name = "FACTOR")]
     assume_scale: Option<f64>,
+    /// Export a grid that is too coarse for the format, with a warning
+    #[arg(long)]
+    allow_coarse: bool,
     /// Error bars, as gonia fill --error wrote them, for formats that hold them
     #[arg(long, value_name = "ERR.exr")]
     error: Option<PathBuf>,
@@ -124,6 +127,7 @@ impl Export {
             dense,
             path,
             scale_by: self.assume_scale,
+            allow_coarse: self.allow_coarse,
         })
     }
 

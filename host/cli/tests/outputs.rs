@@ -512,9 +512,16 @@ fn exports(bench: &mut Bench) {
             "give a factor above 0",
         ),
         (
-            "the same with `--assume-scale 2`",
+            "the same with `--assume-scale 2`, of a grid of 30 degrees",
             "@a.bsdf",
             &["--assume-scale", "2"],
+            1,
+            "or say that it is meant (--allow-coarse)",
+        ),
+        (
+            "the same with `--allow-coarse`",
+            "@a.bsdf",
+            &["--assume-scale", "2", "--allow-coarse"],
             0,
             "is the table's last",
         ),

@@ -45,7 +45,7 @@ impl OriginCounts {
             .par_iter()
             .map(|bin| {
                 let (light, view) = grid.light_and_view(bin.cell as usize);
-                let mirrored = grid.cell(view, light) as u32;
+                let mirrored = grid.cell(view, light) as u64;
                 let alone = all.binary_search_by_key(&mirrored, |b| b.cell).is_err();
                 // Both have the same origin: what is near and within reach is so for either order.
                 let within = reach.origin(light, view) == Origin::Interpolated;
