@@ -571,6 +571,54 @@ fn exports(bench: &mut Bench) {
         let arguments = [&["export", "@a.exr", "-o", output], more].concat();
         bench.case(came_in, &arguments, "", code, &[word]);
     }
+    for (came_in, arguments, code, word) in [
+        (
+            "`export SAMPLES -o a.bsdf`",
+            &["export", "@silent.npy", "-o", "@b.bsdf"][..],
+            1,
+            "does not hold samples; name it .json (BiRD)",
+        ),
+        (
+            "`export SAMPLES -o a.json --error ERR.exr`",
+            &[
+                "export",
+                "@silent.npy",
+                "-o",
+                "@b.json",
+                "--error",
+                "@a.exr",
+            ],
+            1,
+            "--error: goes with a dense BRDF",
+        ),
+        (
+            "`export DENSE.exr --dense DENSE.exr`",
+            &["export", "@a.exr", "-o", "@b.json", "--dense", "@a.exr"],
+            1,
+            "goes with samples, and",
+        ),
+        (
+            "`export SAMPLES -o a.json` of relative samples",
+            &["export", "@silent.npy", "-o", "@b.json"],
+            1,
+            "give the factor that makes it so",
+        ),
+        (
+            "the same with `--assume-scale 2`",
+            &[
+                "export",
+                "@silent.npy",
+                "-o",
+                "@b.json",
+                "--assume-scale",
+                "2",
+            ],
+            0,
+            "says nothing of their rig",
+        ),
+    ] {
+        bench.case(came_in, arguments, "", code, &[word]);
+    }
 }
 
 // long: a list of cases, one after the other
