@@ -8,6 +8,7 @@
 mod cells;
 mod choose;
 mod data;
+mod left_out;
 mod local;
 mod merge;
 mod mirror;
@@ -16,6 +17,8 @@ mod places;
 mod quadratic;
 mod residual;
 mod table;
+mod trial;
+mod tune;
 mod wide;
 
 pub use choose::{Choice, Reason};
