@@ -3,7 +3,8 @@
 //! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
 //! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
 //! `cargo xtask figures fill-fine` measures that. `-- --few` prints the table of few samples alone, at random pairs of
-//! directions: time of a grid of 2°, and error and coverage of the fit at others.
+//! directions: time of a grid of 2°, and error and coverage of the fit at others; a material or a number of samples after
+//! it leaves the other rows out.
 
 #![allow(clippy::expect_used)]
 
@@ -38,7 +39,7 @@ fn main() {
         return measure_row(number(1) as usize, number(2));
     }
     if arguments.iter().any(|a| a == "--few") {
-        return few_samples();
+        return few_samples(&arguments);
     }
     println!(
         "| samples | bins | step | threads | binning, CPU-s | sorting and choosing, CPU-s | fill, CPU-s | all, CPU-s | wall, s | peak, MB |"
@@ -111,14 +112,24 @@ const NOISE: f64 = 0.01;
 /// At so many pairs the fit is compared with the truth.
 const ASKED: usize = 2000;
 
-fn few_samples() {
+/// The rows of all materials and numbers of samples, or of those among the arguments.
+fn few_samples(only: &[String]) {
     println!(
         "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | within 95 % bars |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    for name in ["satin-paint", "fabric"] {
+    let names = ["satin-paint", "fabric"];
+    let is_one = |word: &String| names.contains(&word.as_str());
+    let is_count = |word: &String| word.parse::<usize>().is_ok();
+    let wanted = |word: &str, is_such: &dyn Fn(&String) -> bool| {
+        !only.iter().any(is_such) || only.iter().any(|a| a == word)
+    };
+    for name in names.into_iter().filter(|name| wanted(name, &is_one)) {
         let material = material(name);
-        for samples in FEW {
+        for samples in FEW
+            .into_iter()
+            .filter(|n| wanted(&n.to_string(), &is_count))
+        {
             few_row(name, &*material, samples);
         }
     }
