@@ -14,7 +14,7 @@ use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
 use gonia_brdf::progress::silent;
 use gonia_brdf::random::Random;
 use gonia_brdf::scattered::{FEW_ANISOTROPIC, ScatteredFit};
-use gonia_brdf::{Bins, Brdf, Direction, Elementary, Grid, Sample};
+use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Elementary, Grid, Sample};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
 use std::time::Instant;
@@ -115,9 +115,9 @@ const ASKED: usize = 2000;
 /// The rows of all materials and numbers of samples, or of those among the arguments.
 fn few_samples(only: &[String]) {
     println!(
-        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | within 95 % bars |"
+        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | at nodes | within 95 % bars |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     let names = ["satin-paint", "fabric"];
     let is_one = |word: &String| names.contains(&word.as_str());
     let is_count = |word: &String| word.parse::<usize>().is_ok();
@@ -163,18 +163,23 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     let choosing = lap();
     let symmetry = fit.choice().settings.symmetry;
     let by_blocks = fit.places() > FEW_ANISOTROPIC && !symmetry.is_isotropic();
+    let mut at_nodes = f64::NAN;
     let times = [false, true].map(|with_errors| {
         if by_blocks && with_errors {
             return "by blocks".to_owned();
-        } else if by_blocks {
+        }
+        let dense = if by_blocks {
             let bins = Bins::new(grid, &symmetry.completed(samples.clone()));
             let data = Data::new(&bins);
             let settings = select(&data, FillSettings::DEFAULT).settings;
-            drop(fill(&data, &settings, &silent).expect("enough bins"));
+            fill(&data, &settings, &silent).expect("enough bins")
         } else {
-            drop(fit.dense(grid, with_errors));
-        }
-        format!("{:.1}", lap())
+            fit.dense(grid, with_errors).0
+        };
+        let time = format!("{:.1}", lap());
+        at_nodes = rms_at_nodes(&dense, &truth, &asked);
+        lap();
+        time
     });
     let (mut squares, mut within) = (0.0, 0.0);
     for ((value, error), (l, v)) in fit.at_all(&asked).iter().zip(&asked) {
@@ -186,9 +191,28 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     }
     let all = 3.0 * ASKED as f64;
     println!(
-        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.1} % |",
+        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {at_nodes:.4} | {:.1} % |",
         times.join(" | "),
         (squares / all).sqrt(),
         100.0 * within / all,
     );
+}
+
+/// RMS of logarithms of a dense BRDF over the truth at the nodes nearest to pairs of directions.
+fn rms_at_nodes(
+    dense: &DenseBrdf,
+    truth: &impl Fn(Direction, Direction) -> [f64; 3],
+    pairs: &[(Direction, Direction)],
+) -> f64 {
+    let grid = dense.grid();
+    let mut squares = 0.0;
+    for (light, view) in pairs {
+        let nearest = |d: &Direction| grid.nearest(d.theta_deg(), d.phi_deg());
+        let [l, v] = [light, view].map(|d| nearest(d).expect("within the grid"));
+        let truth = truth(grid.direction(l), grid.direction(v));
+        for (found, truth) in dense.at(l, v).into_iter().zip(truth) {
+            squares += (f64::from(found) / truth).natural_log().powi(2);
+        }
+    }
+    (squares / (3.0 * pairs.len() as f64)).sqrt()
 }

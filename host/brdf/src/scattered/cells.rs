@@ -4,6 +4,7 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
 use super::places::{Near, distance2, exchanged, radius_of};
+use super::planes::{Block, Rows, planes_of, three};
 use super::quadratic::{Cells, Few, Nodes, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
@@ -11,11 +12,9 @@ use crate::direction::Direction;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
-use crate::interpolate::planes::spread_poles;
 use crate::symmetry::Symmetry;
 use pulp::Arch;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Side of the patches of directions that the work begins with, degrees.
 const PATCH_DEG: f64 = 16.0;
@@ -36,66 +35,6 @@ const DIRECT: usize = 40;
 const HALVED_AGAIN: f64 = 1.15;
 /// Places between cells are so many parts of a step apart.
 const PARTS: f64 = 4.0;
-
-/// Planes that many threads write to, each cell once.
-struct Shared(Vec<Vec<AtomicU32>>);
-
-impl Shared {
-    fn new(grid: Grid, channels: usize) -> Self {
-        let plane = || {
-            let cells = (0..grid.n_cells()).into_par_iter();
-            cells.map(|_| AtomicU32::new(0)).collect()
-        };
-        Self((0..channels).map(|_| plane()).collect())
-    }
-
-    /// Stores cells and, with light and view exchanged, their reciprocal ones. Of two that are each other's, the
-    /// one whose light has the lower number serves for both.
-    fn store(&self, grid: Grid, channel: usize, cells: &Cells, values: &[f64]) {
-        let plane = &self.0[channel];
-        let first = [0, 2].map(|axis| cells.directions(axis, grid, 0));
-        let serves = |l: usize, v: usize| !cells.is_own || first[0][l] <= first[1][v];
-        let turns: &[usize] = match cells.is_turned {
-            true => &[0, grid.n_phi() / 2],
-            false => &[0],
-        };
-        for turn in turns {
-            let [lights, views] = [0, 2].map(|axis| cells.directions(axis, grid, *turn));
-            let put = |light: usize, view: usize, value: f64| {
-                plane[grid.cell(light, view)].store((value as f32).to_bits(), Relaxed);
-            };
-            for (l, light) in lights.iter().enumerate() {
-                for (v, view) in views.iter().enumerate() {
-                    if serves(l, v) {
-                        put(*light, *view, values[l * views.len() + v]);
-                    }
-                }
-            }
-            for (v, view) in views.iter().enumerate() {
-                for (l, light) in lights.iter().enumerate() {
-                    if serves(l, v) {
-                        put(*view, *light, values[l * views.len() + v]);
-                    }
-                }
-            }
-        }
-    }
-
-    /// All three planes: of one channel, that one in each.
-    fn into_planes(self, grid: Grid) -> [Vec<f32>; 3] {
-        let mut planes = self.0.into_iter().map(|plane| {
-            let bits = plane.into_iter().map(AtomicU32::into_inner);
-            let mut plane: Vec<f32> = bits.map(f32::from_bits).collect();
-            spread_poles(grid, &mut plane);
-            plane
-        });
-        let first = planes.next().unwrap_or_default();
-        match (planes.next(), planes.next()) {
-            (Some(second), Some(third)) => [first, second, third],
-            _ => [first.clone(), first.clone(), first],
-        }
-    }
-}
 
 /// The systems of some cells: of their places, and where data contradict reciprocity, of the reciprocal ones.
 struct Systems {
@@ -125,6 +64,7 @@ impl Systems {
 /// Cells that share systems, and what holds for all of them.
 struct Shares<'a> {
     systems: &'a Systems,
+    pair: &'a Cells,
     cells: Cells,
     /// What logarithms may be off by.
     tolerance: f64,
@@ -138,15 +78,16 @@ struct Memory {
     work: Work,
     values: Vec<f64>,
     relative: Vec<f64>,
+    /// Values and errors of the pair of patches that is worked on.
+    block: Block,
+    errors: Block,
 }
 
 struct Filler<'a> {
     fit: &'a ScatteredFit,
     grid: Grid,
     channels: usize,
-    values: Shared,
-    /// Standard errors, where wanted.
-    errors: Option<Shared>,
+    with_errors: bool,
     /// The system of all data, where they are few.
     one: Option<Systems>,
     arch: Arch,
@@ -179,8 +120,7 @@ impl ScatteredFit {
             fit: self,
             grid,
             channels,
-            values: Shared::new(grid, channels),
-            errors: with_errors.then(|| Shared::new(grid, channels)),
+            with_errors,
             one: None,
             arch: Arch::new(),
             angles: (0..=(PARTS as usize * grid.n_phi()))
@@ -197,17 +137,26 @@ impl ScatteredFit {
             let near = filler.near(place, self.places.images());
             filler.one = filler.systems(&near);
         }
+        let mut values = planes_of(grid, channels);
+        let mut errors = planes_of(grid, if with_errors { channels } else { 0 });
+        let rows = Rows::of(grid, &mut values);
+        let rows_of_errors = Rows::of(grid, &mut errors);
         pairs(grid, self.choice.settings.symmetry)
             .par_iter()
             .with_max_len(8)
-            .for_each_init(Memory::default, |memory, cells| {
-                filler.fill(*cells, f64::INFINITY, memory)
+            .for_each_init(Memory::default, |memory, pair| {
+                memory.block.clear(pair, channels);
+                if with_errors {
+                    memory.errors.clear(pair, channels);
+                }
+                filler.fill(pair, *pair, f64::INFINITY, memory);
+                memory.block.store(pair, grid, &rows);
+                if with_errors {
+                    memory.errors.store(pair, grid, &rows_of_errors);
+                }
             });
-        let errors = filler.errors.map(|errors| errors.into_planes(grid));
-        (
-            DenseBrdf::from_planes(grid, filler.values.into_planes(grid)),
-            errors,
-        )
+        let errors = with_errors.then(|| three(grid, errors));
+        (DenseBrdf::from_planes(grid, three(grid, values)), errors)
     }
 }
 
@@ -311,7 +260,7 @@ impl Filler<'_> {
 
     /// Fills cells: by one system where they are small against its neighbourhood, else half by half.
     /// `around` is the radius around those that they are half of.
-    fn fill(&self, cells: Cells, around: f64, memory: &mut Memory) {
+    fn fill(&self, pair: &Cells, cells: Cells, around: f64, memory: &mut Memory) {
         let number = |row: usize, column: usize| row * self.grid.n_phi() + column;
         let first_light = number(cells.start[0], cells.start[1]);
         if cells.is_own && first_light > number(cells.end[2] - 1, cells.end[3] - 1) {
@@ -319,7 +268,7 @@ impl Filler<'_> {
             return;
         }
         if let Some(one) = &self.one {
-            return self.share(one, cells, memory);
+            return self.share(one, pair, cells, memory);
         }
         let middle = self.place(cells.middle());
         let reach = (0..16)
@@ -328,7 +277,7 @@ impl Filler<'_> {
             .sqrt();
         let halve = |radius: f64, memory: &mut Memory| {
             for half in cells.halves(self.longest(&cells)) {
-                self.fill(half, radius, memory);
+                self.fill(pair, half, radius, memory);
             }
         };
         if cells.count() > 1 && reach > HALVED_AGAIN * SHARED * around {
@@ -338,7 +287,7 @@ impl Filler<'_> {
         if cells.count() > 1 && reach > SHARED * near.radius() {
             halve(near.radius(), memory);
         } else if let Some(systems) = self.systems(&near) {
-            self.share(&systems, cells, memory);
+            self.share(&systems, pair, cells, memory);
         }
     }
 
@@ -356,7 +305,7 @@ impl Filler<'_> {
         longest.unwrap_or(0)
     }
 
-    fn share(&self, systems: &Systems, cells: Cells, memory: &mut Memory) {
+    fn share(&self, systems: &Systems, pair: &Cells, cells: Cells, memory: &mut Memory) {
         let middle = systems.at(&self.place(cells.middle()), true, &mut memory.work);
         let relative = middle
             .relative
@@ -364,7 +313,7 @@ impl Filler<'_> {
             .copied()
             .fold(f64::INFINITY, f64::min);
         let mut errors = vec![Vec::new(); self.channels];
-        if self.errors.is_some() {
+        if self.with_errors {
             self.each_node(&cells, |place| {
                 let at = systems.at(&place, true, &mut memory.work);
                 for (errors, relative) in errors.iter_mut().zip(at.relative) {
@@ -374,6 +323,7 @@ impl Filler<'_> {
         }
         let shares = Shares {
             systems,
+            pair,
             cells,
             tolerance: (TOLERANCE * self.fit.choice.error_factor * relative).max(TOLERANCE_MIN),
             errors,
@@ -543,10 +493,10 @@ impl Filler<'_> {
 
     fn store(&self, shares: &Shares<'_>, part: Cells, channels: &[Vec<f64>], memory: &mut Memory) {
         for (c, values) in channels.iter().enumerate() {
-            self.values.store(self.grid, c, &part, values);
-            let Some(planes) = &self.errors else {
+            memory.block.put(shares.pair, &part, c, values);
+            if !self.with_errors {
                 continue;
-            };
+            }
             memory.relative.clear();
             let between = Nodes {
                 cells: &shares.cells,
@@ -557,7 +507,8 @@ impl Filler<'_> {
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;
             }
-            planes.store(self.grid, c, &part, &memory.relative);
+            let errors = &mut memory.errors;
+            errors.put(shares.pair, &part, c, &memory.relative);
         }
     }
 }

@@ -14,6 +14,7 @@ mod merge;
 mod mirror;
 mod nugget;
 mod places;
+mod planes;
 mod quadratic;
 mod residual;
 mod table;
