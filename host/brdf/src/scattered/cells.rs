@@ -25,7 +25,7 @@ const NEIGHBOURS: usize = 7;
 /// So many images of the data, or fewer, make one system for all cells.
 const ONE_SYSTEM: usize = 192;
 /// Cells are interpolated where that is off by less than this share of the standard error …
-const TOLERANCE: f64 = 0.15;
+const TOLERANCE: f64 = 0.25;
 /// … or than this share of the value.
 const TOLERANCE_MIN: f64 = 1e-3;
 /// So many cells are not worth a test.
@@ -100,8 +100,10 @@ struct Lines {
     middle: [f64; 3],
     /// First and last along each axis, where that is longer than its nodes.
     ends: [[[f64; 3]; 2]; 4],
-    /// How far logarithms are from quadratic, axis by axis.
+    /// How far logarithms are from quadratic, axis by axis, up to the one with which that is too far.
     bends: [f64; 4],
+    /// Whether they are near enough.
+    are_quadratic: bool,
 }
 
 impl ScatteredFit {
@@ -291,15 +293,24 @@ impl Filler<'_> {
         }
     }
 
+    /// The axes of more than two cells, that along which they reach farthest first.
+    fn by_length(&self, cells: &Cells) -> Vec<usize> {
+        let mut axes: Vec<usize> = (0..4).filter(|axis| cells.length(*axis) > 2).collect();
+        let length = |axis: &usize| self.reach(cells, *axis);
+        axes.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        axes
+    }
+
+    /// How far cells reach along an axis, steps of the grid.
+    fn reach(&self, cells: &Cells, axis: usize) -> f64 {
+        let steps = (cells.length(axis) - 1) as f64;
+        let theta = (cells.middle()[axis & 2] * self.grid.step_deg()).to_radians();
+        steps * if axis & 1 == 0 { 1.0 } else { theta.sine() }
+    }
+
     /// The axis along which cells reach farthest.
     fn longest(&self, cells: &Cells) -> usize {
-        let middle = cells.middle();
-        let length = |axis: usize| {
-            let steps = cells.length(axis) - 1;
-            let theta = (middle[axis & 2] * self.grid.step_deg()).to_radians();
-            let per_step = if axis & 1 == 0 { 1.0 } else { theta.sine() };
-            steps as f64 * per_step
-        };
+        let length = |axis: usize| self.reach(cells, axis);
         let axes = (0..4).filter(|axis| cells.length(*axis) > 1);
         let longest = axes.max_by(|a, b| length(*a).total_cmp(&length(*b)));
         longest.unwrap_or(0)
@@ -368,7 +379,7 @@ impl Filler<'_> {
         }
         let lines = self.lines(shares, &part, &mut memory.work);
         let bends = lines.bends;
-        if bends.iter().sum::<f64>() <= shares.tolerance {
+        if lines.are_quadratic {
             let mut nodes = self.nodes(shares, &part, &lines, &mut memory.work);
             if self.meets_between(shares, &part, &nodes, &mut memory.work) {
                 for values in &mut nodes {
@@ -430,8 +441,9 @@ impl Filler<'_> {
         let middle = logs(at);
         let mut ends = [[middle; 2]; 4];
         let mut bends = [0.0; 4];
-        // Two cells are nodes themselves, and so are three.
-        for axis in (0..4).filter(|axis| part.length(*axis) > 2) {
+        let mut are_quadratic = true;
+        // Two cells are nodes themselves, and so are three. Where parts reach far they bend most.
+        for axis in self.by_length(part) {
             let mut along = |share: f64| {
                 let mut place = at;
                 place[axis] = part.at(axis, share);
@@ -449,10 +461,15 @@ impl Filler<'_> {
                     bends[axis] = (found[c] - between).abs().max(bends[axis]);
                 }
             }
+            are_quadratic = bends.iter().sum::<f64>() <= shares.tolerance;
+            if !are_quadratic {
+                break;
+            }
         }
         Lines {
             middle,
             ends,
+            are_quadratic,
             bends,
         }
     }
