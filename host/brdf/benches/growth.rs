@@ -115,9 +115,9 @@ const ASKED: usize = 2000;
 /// The rows of all materials and numbers of samples, or of those among the arguments.
 fn few_samples(only: &[String]) {
     println!(
-        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | at nodes | within 95 % bars |"
+        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | at nodes | within 95 % bars | at nodes |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     let names = ["satin-paint", "fabric"];
     let is_one = |word: &String| names.contains(&word.as_str());
     let is_count = |word: &String| word.parse::<usize>().is_ok();
@@ -163,7 +163,7 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     let choosing = lap();
     let symmetry = fit.choice().settings.symmetry;
     let by_blocks = fit.places() > FEW_ANISOTROPIC && !symmetry.is_isotropic();
-    let mut at_nodes = f64::NAN;
+    let mut at_nodes = (f64::NAN, f64::NAN);
     let times = [false, true].map(|with_errors| {
         if by_blocks && with_errors {
             return "by blocks".to_owned();
@@ -172,12 +172,13 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
             let bins = Bins::new(grid, &symmetry.completed(samples.clone()));
             let data = Data::new(&bins);
             let settings = select(&data, FillSettings::DEFAULT).settings;
-            fill(&data, &settings, &silent).expect("enough bins")
+            let dense = fill(&data, &settings, &silent).expect("enough bins");
+            (dense, None)
         } else {
-            fit.dense(grid, with_errors).0
+            fit.dense(grid, with_errors)
         };
         let time = format!("{:.1}", lap());
-        at_nodes = rms_at_nodes(&dense, &truth, &asked);
+        at_nodes = against_truth(&dense, &truth, &asked);
         lap();
         time
     });
@@ -191,28 +192,39 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     }
     let all = 3.0 * ASKED as f64;
     println!(
-        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {at_nodes:.4} | {:.1} % |",
+        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.4} | {:.1} % | {:.1} % |",
         times.join(" | "),
         (squares / all).sqrt(),
+        at_nodes.0,
         100.0 * within / all,
+        at_nodes.1,
     );
 }
 
-/// RMS of logarithms of a dense BRDF over the truth at the nodes nearest to pairs of directions.
-fn rms_at_nodes(
-    dense: &DenseBrdf,
+/// A dense BRDF with its errors at the nodes nearest to pairs of directions: RMS of logarithms over the truth, and the
+/// share within 95 % bars, percent.
+fn against_truth(
+    (dense, errors): &(DenseBrdf, Option<[Vec<f32>; 3]>),
     truth: &impl Fn(Direction, Direction) -> [f64; 3],
     pairs: &[(Direction, Direction)],
-) -> f64 {
+) -> (f64, f64) {
     let grid = dense.grid();
-    let mut squares = 0.0;
+    let (mut squares, mut within) = (0.0, 0.0);
     for (light, view) in pairs {
         let nearest = |d: &Direction| grid.nearest(d.theta_deg(), d.phi_deg());
         let [l, v] = [light, view].map(|d| nearest(d).expect("within the grid"));
         let truth = truth(grid.direction(l), grid.direction(v));
-        for (found, truth) in dense.at(l, v).into_iter().zip(truth) {
-            squares += (f64::from(found) / truth).natural_log().powi(2);
+        for (c, (found, truth)) in dense.at(l, v).into_iter().zip(truth).enumerate() {
+            let found = f64::from(found);
+            squares += (found / truth).natural_log().powi(2);
+            let error = |e: &[Vec<f32>; 3]| f64::from(e[c][grid.cell(l, v)]);
+            let error = errors.as_ref().map_or(f64::NAN, error);
+            within += match error.is_nan() {
+                true => f64::NAN,
+                false => f64::from(u8::from((found - truth).abs() <= 1.96 * error)),
+            };
         }
     }
-    (squares / (3.0 * pairs.len() as f64)).sqrt()
+    let all = 3.0 * pairs.len() as f64;
+    ((squares / all).sqrt(), 100.0 * within / all)
 }

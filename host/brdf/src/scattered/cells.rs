@@ -323,15 +323,10 @@ impl Filler<'_> {
             .iter()
             .copied()
             .fold(f64::INFINITY, f64::min);
-        let mut errors = vec![Vec::new(); self.channels];
-        if self.with_errors {
-            self.each_node(&cells, |place| {
-                let at = systems.at(&place, true, &mut memory.work);
-                for (errors, relative) in errors.iter_mut().zip(at.relative) {
-                    errors.push((self.fit.choice.error_factor * relative).natural_log());
-                }
-            });
-        }
+        let errors = match self.with_errors {
+            true => self.errors(systems, &cells, &mut memory.work),
+            false => vec![Vec::new(); self.channels],
+        };
         let shares = Shares {
             systems,
             pair,
@@ -340,6 +335,39 @@ impl Filler<'_> {
             errors,
         };
         self.refine(&shares, cells, memory);
+    }
+
+    /// Logarithms of relative standard errors at all nodes of cells, channel by channel. Between the few that are computed
+    /// they stay within these.
+    fn errors(&self, systems: &Systems, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut logs = |place: Pair| {
+            let relative = systems.at(&place, true, work).relative;
+            let logs = relative.map(|r| (self.fit.choice.error_factor * r).natural_log());
+            low = [0, 1, 2].map(|c| low[c].min(logs[c]));
+            high = [0, 1, 2].map(|c| high[c].max(logs[c]));
+            logs
+        };
+        let mut nodes = if (0..4).all(|axis| cells.length(axis) > 2) {
+            let at = cells.middle();
+            let middle = logs(self.place(at));
+            let ends = [0, 1, 2, 3].map(|axis| {
+                [0.0, 1.0].map(|share| {
+                    let mut place = at;
+                    place[axis] = cells.at(axis, share);
+                    logs(self.place(place))
+                })
+            });
+            self.few_nodes(cells, (middle, ends), &mut logs)
+        } else {
+            self.all_nodes(cells, &mut logs)
+        };
+        for (c, nodes) in nodes.iter_mut().enumerate() {
+            for log in nodes {
+                *log = log.clamp(low[c], high[c]);
+            }
+        }
+        nodes
     }
 
     /// The places of the nodes of a box, those of the last axis next to each other.
@@ -413,23 +441,38 @@ impl Filler<'_> {
         lines: &Lines,
         work: &mut Work,
     ) -> Vec<Vec<f64>> {
+        let mut logs = |place: Pair| shares.systems.logs_at(&place, work);
         if (0..4).all(|axis| part.length(axis) > 2) {
-            let corners: [[f64; 3]; 16] = std::array::from_fn(|bits| {
-                let place = self.place(part.corner(bits));
-                shares.systems.logs_at(&place, work)
-            });
-            let few = |c: usize| Few {
-                middle: lines.middle[c],
-                ends: lines.ends.map(|ends| ends.map(|end| end[c])),
-                corners: corners.map(|corner| corner[c]),
-            };
-            return (0..self.channels).map(|c| few(c).all()).collect();
+            self.few_nodes(part, (lines.middle, lines.ends), &mut logs)
+        } else {
+            self.all_nodes(part, &mut logs)
         }
+    }
+
+    /// Values at all nodes of cells of more than two along each axis, by those in the middle, at the ends of the lines
+    /// through it, and at the corners.
+    fn few_nodes(
+        &self,
+        cells: &Cells,
+        (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
+        at: &mut impl FnMut(Pair) -> [f64; 3],
+    ) -> Vec<Vec<f64>> {
+        let corners: [[f64; 3]; 16] =
+            std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
+        let few = |c: usize| Few {
+            middle: middle[c],
+            ends: ends.map(|ends| ends.map(|end| end[c])),
+            corners: corners.map(|corner| corner[c]),
+        };
+        (0..self.channels).map(|c| few(c).all()).collect()
+    }
+
+    /// Values at all nodes of cells, each computed.
+    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; 3]) -> Vec<Vec<f64>> {
         let mut nodes = vec![Vec::new(); self.channels];
-        self.each_node(part, |place| {
-            let logs = shares.systems.logs_at(&place, work);
-            for (nodes, log) in nodes.iter_mut().zip(logs) {
-                nodes.push(log);
+        self.each_node(cells, |place| {
+            for (nodes, value) in nodes.iter_mut().zip(at(place)) {
+                nodes.push(value);
             }
         });
         nodes
