@@ -1,8 +1,8 @@
 //! What channels cost: time and error of a fill of one value, of colours and of 31 bands, preset by preset.
 //!
-//! `cargo bench -p gonia-brdf --bench channels [-- MATERIAL …] [--step 2] [all]` prints a table. Every tenth of the
-//! paper's poses, on a grid of 4°; `all`: all of them. CPU-s: choosing and
-//! filling; the error is the RMS of ln(f/f_true) over all cells with both θ ≤ 75°, of all channels.
+//! `cargo bench -p gonia-brdf --bench channels [-- MATERIAL …] [PRESET …] [--step 2] [all]` prints a table: of every
+//! tenth of the paper's poses, on a grid of 4°; `all`: of all of them. CPU-s: choosing and filling; the error is the RMS
+//! of ln(f/f_true) over cells with both θ ≤ 75°, of all channels.
 
 #![allow(clippy::expect_used)]
 
@@ -31,10 +31,13 @@ fn main() {
         all if all.len() == plan::MATERIALS.len() => vec!["fabric"],
         named => named,
     };
+    let has = |preset: &Preset| arguments.iter().any(|a| a == preset.name());
+    let any = Preset::ALL.iter().any(has);
+    let wanted = |preset: &Preset| !any || has(preset);
     for name in names {
         let material = material(name);
         let samples = measure_with(&*material, 0.0, &poses);
-        for preset in Preset::ALL {
+        for preset in Preset::ALL.into_iter().filter(wanted) {
             let colours = row::<3>(grid, &samples, &*material, preset);
             let one = row::<1>(grid, &samples, &*material, preset);
             let bands = row::<31>(grid, &samples, &*material, preset);
