@@ -3,9 +3,9 @@
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
 //! [--neighbours 128] [--tolerance 1] [--target-error 0.002] [--budget 4] [--exponent 0.1] [--kernel 0.3] [--noise 0.015]
-//! [tenth|quick|--poses 2000] [--plane 23]`
+//! [tenth|quick|--poses 2000|--even 2000] [--plane 23]`
 //!
-//! The poses are the paper's 8505, every tenth of them, about so many of them, or the 925 of the quick demo. With
+//! The poses are the paper's 8505, every tenth of them, about so many of them, about so many in even rings, or the 925 of the quick demo. With
 //! `--plane` the samples have their images by a half-turn and by a plane of that azimuth, degrees, too.
 //! Without `--exponent` the coordinates are chosen; with it, these are taken.
 //!
@@ -89,6 +89,10 @@ fn run(name: &str, arguments: &Arguments) {
     let (poses, how_many) = match arguments.number("--poses", 0.0) as usize {
         0 => (poses, how_many.to_owned()),
         count => (Poses::few(count), format!("about {count}")),
+    };
+    let (poses, how_many) = match arguments.number("--even", 0.0) as usize {
+        0 => (poses, how_many),
+        count => (Poses::even(count), format!("{count}, even")),
     };
     let model = material(name);
     let samples = measure_with(&*model, arguments.number("--noise", plan::NOISE), &poses);

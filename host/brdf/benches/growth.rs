@@ -192,12 +192,15 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     }
     let all = 3.0 * ASKED as f64;
     println!(
-        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.4} | {:.1} % | {:.1} % |",
+        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.4} | {:.1} % | {} |",
         times.join(" | "),
         (squares / all).sqrt(),
         at_nodes.0,
         100.0 * within / all,
-        at_nodes.1,
+        match at_nodes.1.is_nan() {
+            true => "–".to_owned(),
+            false => format!("{:.1} %", at_nodes.1),
+        },
     );
 }
 
