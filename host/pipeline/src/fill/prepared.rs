@@ -102,11 +102,10 @@ impl Prepared {
         let mut facts = of_this_program();
         facts.insert("interpolation".into(), settings.to_owned());
         facts.insert("symmetry".into(), self.symmetry.clone());
-        // A fit of the samples as they are: with their file and this it can be made again, but for a plane that was
-        // stated.
-        let is_stated = options.symmetry_of_plane().is_some();
-        if self.fit.is_some() && self.are_few && !is_stated {
-            let symmetry = fit_symmetry(options.symmetry).to_owned();
+        // A fit of the samples as they are: with their file and this it can be made again.
+        if self.fit.is_some() && self.are_few {
+            let plane = options.symmetry_of_plane().map(|(_, plane)| plane);
+            let symmetry = fit_symmetry(options.symmetry, plane);
             facts.insert(FIT_SYMMETRY.into(), symmetry);
         }
         facts
