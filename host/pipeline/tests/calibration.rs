@@ -425,7 +425,8 @@ fn fifty_rigs_lie_within_their_uncertainties() {
                 continue;
             }
         };
-        let errors = errors(&found.rig, &truth);
+        // At the poses that uncertainties are stated for.
+        let errors = errors_at(found.poses.iter().copied(), [&found.rig, &truth]);
         // A light that was left as it is has no uncertainty that its frames gave.
         let is_lit = matches!(found.light, LightState::Found { .. });
         for (error, u) in errors
@@ -560,7 +561,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// `cargo test -p gonia-pipeline --test calibration where -- --ignored --nocapture` prints the rows of the guide's
-/// table: errors and uncertainties at the case's own poses. Each case is refused, or what it finds lies within
+/// table: errors and uncertainties from straight above to the lowest frame, at the case's own azimuths. Each case is refused, or what it finds lies within
 /// its stated uncertainty, or a warning says that it may not.
 #[test]
 #[ignore = "18 calibrations, two minutes of a core"]
@@ -570,7 +571,6 @@ fn where_calibration_fails_it_says_so() {
     let mut wrong = Vec::new();
     for case in cases() {
         let truth = crooked(case.px, 0.5, 21);
-        let poses: Vec<Pose> = case.rows.iter().map(|row| row.pose).collect();
         let source = Rendered::scattered(&truth, case.rows, &case.scatter);
         let found = match calibrate(&case.said, &source, &silent) {
             Ok(found) => found,
@@ -579,7 +579,7 @@ fn where_calibration_fails_it_says_so() {
                 continue;
             }
         };
-        let errors = errors_at(poses.into_iter(), [&found.rig, &truth]);
+        let errors = errors_at(found.poses.iter().copied(), [&found.rig, &truth]);
         let u = found.direction_u;
         let is_lit = matches!(found.light, LightState::Found { .. });
         let of = |which: usize| match which == 0 && !is_lit {

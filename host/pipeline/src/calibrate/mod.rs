@@ -51,7 +51,7 @@ use light::{Known, Light};
 use lines::misfit_px;
 use look::{Seen, look_again, look_near};
 use mirror::{MirrorFrame, MirrorLight};
-use numbers::{changes, direction_u};
+use numbers::{changes, direction_u, stated_poses};
 use record::{direction_u_of_light_as_it_was, record, table};
 use search::first_camera;
 use unknowns::{CAMERA, LIGHT, values, with_values};
@@ -78,7 +78,9 @@ pub struct Calibrated {
     pub light: LightState,
     /// What frames of a mirror say of it.
     pub mirror: Option<MirrorFit>,
-    /// By how much directions of light and view changed, degrees, over the frames.
+    /// Poses from straight above to the lowest of the frames, at the frames' azimuths: those of the next two.
+    pub poses: Vec<Pose>,
+    /// By how much directions of light and view changed, degrees.
     pub changes: [Spread; 2],
     /// Their standard uncertainties now, degrees; of a light that was left as it was, what was thought possible.
     pub direction_u: [Spread; 2],
@@ -150,7 +152,8 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     remarks.extend(few_shown(looked_at, shown));
     let found = light.rig(&with_camera);
 
-    let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
+    let taken: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
+    let poses = stated_poses(&taken);
     let mut numbers = table(
         &CAMERA,
         &values(&CAMERA, rig),
@@ -190,6 +193,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         frames: [looked_at, lines.len()],
         lines_px: [median(rig), median(&found)],
         changes: changes(rig, &found, &poses),
+        poses,
         direction_u,
         light: light.state(),
         mirror: mirror.as_ref().map(MirrorLight::fit),
