@@ -179,7 +179,10 @@ impl Spread {
 /// most are low, and the fewest from above, where the light is known least.
 pub fn stated_poses(frames: &[Pose]) -> Vec<Pose> {
     let lowest = |of: fn(&Pose) -> f64| frames.iter().map(of).fold(0.0, f64::max);
-    let [light, view] = [lowest(|pose| pose.light.theta), lowest(|pose| pose.view.theta)];
+    let [light, view] = [
+        lowest(|pose| pose.light.theta),
+        lowest(|pose| pose.view.theta),
+    ];
     let every = frames.len().div_ceil(AZIMUTHS).max(1);
     let at = |pose: &Pose, step: usize| {
         let share = step as f64 / POLAR_STEPS as f64;
