@@ -14,7 +14,7 @@ use gonia_brdf::Pose;
 use gonia_formats::FileError;
 use gonia_pipeline::calibrate::LightState;
 use gonia_pipeline::process::FrameSource;
-use gonia_pipeline::{Calibrated, calibrate, silent};
+use gonia_pipeline::{Calibrated, Step, calibrate, silent};
 use gonia_rig::{Frame, FrameRow, Role};
 use rendered::{Rendered, Scatter, crooked, errors, nominal, random_rows, rings};
 use std::ops::ControlFlow;
