@@ -495,6 +495,7 @@ fn promise_gigabytes(dense: &Path, path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
+// long: a list of cases, one after the other
 fn exports(bench: &mut Bench) {
     for (came_in, output, more, code, word) in [
         (

@@ -32,7 +32,7 @@ pub(super) struct Prepared {
     pub completed_by: Symmetry,
     pub origins: OriginCounts,
     /// Cells into which samples fell themselves, where the bins hold their images too.
-    pub own: Option<Vec<u32>>,
+    pub own: Option<Vec<u64>>,
     pub remarks: Vec<Remark>,
 }
 
@@ -80,7 +80,7 @@ impl Prepared {
         };
         let images = symmetry.order();
         let (bins, own) = if images > 1 {
-            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u32>>();
+            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u64>>();
             let completed = Bins::new(grid, &symmetry.completed(samples.to_vec()));
             (completed, Some(own))
         } else {
