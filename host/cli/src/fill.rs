@@ -54,6 +54,10 @@ pub struct Fill {
     /// noise; 0 refines all, inf none [default: the preset's, or more where refining would cost too much]
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,
+    /// Refine no block for a smaller relative difference than this, percent, however little noise samples have: what
+    /// the use of the BRDF needs [default: 0.2; 0 with --tolerance]
+    #[arg(long, value_name = "PERCENT")]
+    target_error: Option<f32>,
     /// The material's symmetry about its normal: auto (what few samples show, or leave to be assumed),
     /// none, isotropic, bilateral, half-turn or half-turn-bilateral
     #[arg(long, value_enum, default_value = "auto")]
@@ -106,6 +110,7 @@ impl Fill {
             block_deg: self.block,
             nodes: self.nodes,
             tolerance: self.tolerance,
+            target_error: self.target_error.map(|percent| percent / 100.0),
             with_errors: self.error.is_some(),
             symmetry: self.symmetry.into(),
             plane_deg: self.plane,

@@ -47,6 +47,9 @@ pub struct FillSettings {
     /// A block is refined where a finer one differs from it by more than this many standard deviations
     /// of one sample: with 0 everywhere, with infinity nowhere.
     pub tolerance: f32,
+    /// And by more than this relative difference, whatever the noise, 0 ..= ∞: [`select()`] raises the tolerance to it.
+    /// The smaller the noise, the more blocks differ by it; what nobody needs to know is not refined.
+    pub target_error: f32,
     /// What refinement may cost, in fine blocks a pair of patches, on average: [`select()`] raises the
     /// tolerance to it.
     pub budget: f32,
@@ -109,6 +112,7 @@ impl Preset {
         FillSettings {
             block_deg,
             tolerance,
+            target_error: TARGET_ERROR,
             budget,
             neighbours,
             one_bin_in,
@@ -167,6 +171,8 @@ impl FillSettings {
     }
 }
 
+/// Relative errors below this are refined on no one's behalf: two hundredths of a ΔE00.
+const TARGET_ERROR: f32 = 0.002;
 /// Two fits through different data never agree better than this, whatever the samples' noise.
 const NOISE_MIN: f32 = 0.003;
 

@@ -50,7 +50,7 @@ impl OriginCounts {
             .par_iter()
             .map(|bin| {
                 let (light, view) = grid.light_and_view(bin.cell as usize);
-                let mirrored = grid.cell(view, light) as u32;
+                let mirrored = grid.cell(view, light) as u64;
                 let alone = all.binary_search_by_key(&mirrored, |b| b.cell).is_err();
                 // Both have the same origin: what is near and within reach is so for either order.
                 let within = reach.origin(light, view) == Origin::Interpolated;
@@ -70,18 +70,18 @@ impl OriginCounts {
     }
 
     /// The same, of bins that hold images by a symmetry: `own` are the cells, ascending, into which samples fell themselves.
-    pub fn with_images<const N: usize>(bins: &Bins<N>, own: &[u32]) -> Self {
+    pub fn with_images<const N: usize>(bins: &Bins<N>, own: &[u64]) -> Self {
         Self::of(bins).without_images(bins.grid(), own, |_| 1)
     }
 
     /// What is measured in more than one's own cells is so by symmetry; a cell stands for `repeats` ones.
-    fn without_images(mut self, grid: Grid, own: &[u32], repeats: impl Fn(u32) -> u64) -> Self {
+    fn without_images(mut self, grid: Grid, own: &[u64], repeats: impl Fn(u64) -> u64) -> Self {
         let both = self.measured + self.reciprocal;
-        let mirrored = |cell: u32| {
+        let mirrored = |cell: u64| {
             let (light, view) = grid.light_and_view(cell as usize);
-            grid.cell(view, light) as u32
+            grid.cell(view, light) as u64
         };
-        let is_alone = |cell: &&u32| own.binary_search(&mirrored(**cell)).is_err();
+        let is_alone = |cell: &&u64| own.binary_search(&mirrored(**cell)).is_err();
         self.measured = own.iter().map(|cell| repeats(*cell)).sum();
         self.reciprocal = own.iter().filter(is_alone).map(|cell| repeats(*cell)).sum();
         self.symmetric = both - self.measured - self.reciprocal;
@@ -196,7 +196,7 @@ fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
 pub struct IsotropicOrigins {
     grid: Grid,
     /// Cells into which samples fell, ascending.
-    own: Vec<u32>,
+    own: Vec<u64>,
     /// By rows of light and of view, and the difference of azimuths: an [`Origin`] each.
     table: Vec<u8>,
 }
@@ -303,7 +303,7 @@ fn repeats(grid: Grid, direction: usize) -> Range<usize> {
 }
 
 /// Puts down which cells samples fell into, and which by reciprocity.
-fn mark(origins: &mut [u8], grid: Grid, own: &[u32], repeats: impl Fn(usize) -> Range<usize>) {
+fn mark(origins: &mut [u8], grid: Grid, own: &[u64], repeats: impl Fn(usize) -> Range<usize>) {
     for origin in [Origin::Reciprocal, Origin::Measured] {
         for cell in own {
             let (light, view) = grid.light_and_view(*cell as usize);
@@ -322,12 +322,12 @@ fn mark(origins: &mut [u8], grid: Grid, own: &[u32], repeats: impl Fn(usize) -> 
 
 /// Where each cell's value comes from, as an [`Origin`] a cell.
 pub fn origins<const N: usize>(bins: &Bins<N>) -> Vec<u8> {
-    let own: Vec<u32> = bins.bins().iter().map(|bin| bin.cell).collect();
+    let own: Vec<u64> = bins.bins().iter().map(|bin| bin.cell).collect();
     origins_with_images(bins, &own)
 }
 
 /// The same, of bins that hold images by a symmetry: `own` are the cells, ascending, into which samples fell themselves.
-pub fn origins_with_images<const N: usize>(bins: &Bins<N>, own: &[u32]) -> Vec<u8> {
+pub fn origins_with_images<const N: usize>(bins: &Bins<N>, own: &[u64]) -> Vec<u8> {
     let grid = bins.grid();
     let (reach, n) = (Reach::new(bins), grid.n_directions());
     let mut origins: Vec<u8> = (0..n)
@@ -400,7 +400,7 @@ mod tests {
             })
             .collect();
         let plain = Bins::new(grid, &samples);
-        let own: Vec<u32> = plain.bins().iter().map(|bin| bin.cell).collect();
+        let own: Vec<u64> = plain.bins().iter().map(|bin| bin.cell).collect();
         let completed = Bins::new(grid, &Symmetry::HalfTurn.completed(samples));
         let isotropic = IsotropicOrigins::of(&plain, true);
         let both = [

@@ -84,7 +84,7 @@ pub struct Filled {
     /// Standard errors, where asked for.
     pub errors: Option<ChannelErrors>,
     /// Cells with a sample, by number ([`Grid::cell`](gonia_brdf::Grid::cell)).
-    pub cells: Vec<u32>,
+    pub cells: Vec<u64>,
     /// How it came about.
     pub account: FillAccount,
 }

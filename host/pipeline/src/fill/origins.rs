@@ -10,13 +10,13 @@ pub(super) enum Origins<'a> {
     Anisotropic {
         bins: &'a Bins,
         /// Cells into which samples fell themselves, where the bins hold their images too.
-        own: Option<&'a [u32]>,
+        own: Option<&'a [u64]>,
     },
 }
 
 impl<'a> Origins<'a> {
     /// Of cells that a fit fills, or the bins alone; `own` are the cells of samples themselves where the bins hold images.
-    pub fn of(bins: &'a Bins, own: Option<&'a [u32]>, fit: Option<&ScatteredFit>) -> Self {
+    pub fn of(bins: &'a Bins, own: Option<&'a [u64]>, fit: Option<&ScatteredFit>) -> Self {
         match fit.map(|fit| fit.choice().settings.symmetry) {
             Some(Symmetry::Isotropic) => Origins::Isotropic(IsotropicOrigins::of(bins, true)),
             Some(Symmetry::Turns) => Origins::Isotropic(IsotropicOrigins::of(bins, false)),

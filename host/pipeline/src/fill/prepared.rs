@@ -32,7 +32,7 @@ pub(super) struct Prepared {
     pub completed_by: Symmetry,
     pub origins: OriginCounts,
     /// Cells into which samples fell themselves, where the bins hold their images too.
-    pub own: Option<Vec<u32>>,
+    pub own: Option<Vec<u64>>,
     pub remarks: Vec<Remark>,
 }
 
@@ -80,7 +80,7 @@ impl Prepared {
         };
         let images = symmetry.order();
         let (bins, own) = if images > 1 {
-            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u32>>();
+            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u64>>();
             let completed = Bins::new(grid, &symmetry.completed(samples.to_vec()));
             (completed, Some(own))
         } else {
@@ -107,11 +107,10 @@ impl Prepared {
         let mut facts = of_this_program();
         facts.insert("interpolation".into(), settings.to_owned());
         facts.insert("symmetry".into(), self.symmetry.clone());
-        // A fit of the samples as they are: with their file and this it can be made again, but for a plane that was
-        // stated.
-        let is_stated = options.symmetry_of_plane().is_some();
-        if self.fit.is_some() && self.are_few && !is_stated {
-            let symmetry = fit_symmetry(options.symmetry).to_owned();
+        // A fit of the samples as they are: with their file and this it can be made again.
+        if self.fit.is_some() && self.are_few {
+            let plane = options.symmetry_of_plane().map(|(_, plane)| plane);
+            let symmetry = fit_symmetry(options.symmetry, plane);
             facts.insert(FIT_SYMMETRY.into(), symmetry);
         }
         facts

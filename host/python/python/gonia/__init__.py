@@ -219,12 +219,14 @@ class Dense:
         format: str | None = None,
         resolution: int | None = None,
         assume_scale: float | None = None,
+        allow_coarse: bool = False,
     ) -> dict[str, Any]:
         """Writes another program's format, by the ending or by name (``gonia export --list-formats``).
 
-        A dict: how far the file, read back, is from the values (``median``, ``p99``, ``rms`` of abs(ln)).
+        Uncertainties go where the format has a place for them. A grid that is too coarse for the format is refused, unless
+        ``allow_coarse``. A dict: how far the file, read back, is from the values (``median``, ``p99``, ``rms`` of abs(ln)).
         """
-        found = _gonia.export(self._of, os.fspath(path), format, resolution, assume_scale)
+        found = _gonia.export(self._of, os.fspath(path), format, resolution, assume_scale, allow_coarse)
         _warn(found["remarks"])
         return found
 
