@@ -276,7 +276,7 @@ fn worth(parts: &[StratumBudget], poses: &[(&'static str, OfPoses)]) -> Markup {
                 "What more poses buy is in the chart of gonia chart SAMPLES, which leaves frames out and measures it."
             } @else {
                 "What more poses buy is predicted from the errors at frames that were left out, by all other frames and by \
-                 half of them."
+                 half of them; of highlights it cannot be predicted."
             }
         }
         div.wide { table {

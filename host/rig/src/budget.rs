@@ -53,6 +53,11 @@ pub struct Budget {
     pub camera_mm: f64,
     /// Side of the square that a sample is the median of, mm.
     pub patch_mm: f64,
+    /// The share of a frame from straight above that shows the sample, above 0 to 1: stray light is of the whole frame.
+    pub frame_share: f64,
+    /// What the target's lines and the rest of the frame add to the mean of the sample, over its share of the frame, in
+    /// the unit of the values; ≥ 0.
+    pub surround: f64,
     inputs: [(f64, KnownFrom); Input::ALL.len()],
 }
 
@@ -71,8 +76,18 @@ impl Budget {
             light_mm,
             camera_mm,
             patch_mm,
+            frame_share: 1.0,
+            surround: 0.0,
             inputs: Input::ALL.map(of),
         }
+    }
+
+    /// The budget with a frame's share of the sample and what the rest adds to its mean; without it the sample fills
+    /// frames.
+    #[must_use]
+    pub fn with_frame(mut self, [share, surround]: [f64; 2]) -> Self {
+        (self.frame_share, self.surround) = (share, surround);
+        self
     }
 
     /// The value of an input: a standard uncertainty, or a diameter.
@@ -100,12 +115,15 @@ impl fmt::Display for Budget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{}{BETWEEN}level {}{BETWEEN}light {} mm{BETWEEN}camera {} mm{BETWEEN}patch {} mm",
+            "{}{BETWEEN}level {}{BETWEEN}light {} mm{BETWEEN}camera {} mm{BETWEEN}patch {} mm\
+             {BETWEEN}frame {}{BETWEEN}surround {}",
             self.calibration.name(),
             self.level,
             self.light_mm,
             self.camera_mm,
-            self.patch_mm
+            self.patch_mm,
+            self.frame_share,
+            self.surround
         )?;
         for input in Input::ALL {
             let (value, from) = self.inputs[input as usize];
@@ -152,6 +170,9 @@ impl FromStr for Budget {
             light_mm: number("light")?,
             camera_mm: number("camera")?,
             patch_mm: number("patch")?,
+            // Records of before 28 November 2026 have neither.
+            frame_share: found("frame").map_or(1.0, |of| of.0),
+            surround: found("surround").map_or(0.0, |of| of.0),
             inputs,
         })
     }
@@ -169,9 +190,11 @@ mod tests {
         let budget = Budget::new(known, 0.315, [1100.0, 1800.0, 14.0], |input| {
             rig.input(input)
         });
-        let budget = budget.with(Input::Drift, 0.001);
+        let budget = budget.with(Input::Drift, 0.001).with_frame([0.25, 0.01]);
         let text = budget.to_string();
-        assert_eq!(text.parse(), Ok(budget));
+        assert_eq!(text.parse(), Ok(budget.clone()));
+        let of_before = text.replace("; frame 0.25; surround 0.01", "").parse();
+        assert_eq!(of_before, Ok(budget.with_frame([1.0, 0.0])));
         for (from, to, named) in [
             ("known reference", "some reference", "reference"),
             ("drift 0.001", "drift -0.001", "uncertainty.drift"),

@@ -23,6 +23,7 @@ const LEAST_ERROR: f32 = 0.1;
 const LARGEST: f32 = 2.0;
 
 /// Exponents p of `u ∝ n^−p` by part of the domain, n the number of frames, 0 ..= 2; `None` where noise hides them.
+/// Highlights have none: the few bins that are left out there predict it no better than a guess.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorFall {
     /// Of all cells.
@@ -31,8 +32,6 @@ pub struct ErrorFall {
     pub interior: Option<f32>,
     /// Of either above.
     pub grazing: Option<f32>,
-    /// Of the brightest.
-    pub highlight: Option<f32>,
 }
 
 impl ErrorFall {
@@ -54,11 +53,11 @@ impl ErrorFall {
             whole.extend(fold.predict_means(data, settings));
             half.extend(fold.halved().predict_means(data, settings));
         }
-        let exponent = |is_in: &dyn Fn(bool, bool) -> bool| {
+        let exponent = |is_in: &dyn Fn(bool) -> bool| {
             let pairs = whole.iter().zip(&half);
             let of_part = pairs.filter(|(of, _)| {
-                let (grazing, bright) = calibration.place_of(of);
-                is_in(grazing, bright)
+                let (grazing, _) = calibration.place_of(of);
+                is_in(grazing)
             });
             let (whole, half): (Vec<_>, Vec<_>) = of_part.unzip();
             if whole.len() < TESTS_MIN {
@@ -69,10 +68,9 @@ impl ErrorFall {
             Some(((0.5 * ratio.natural_log() / std::f64::consts::LN_2) as f32).clamp(0.0, LARGEST))
         };
         Self {
-            all: exponent(&|_, _| true),
-            interior: exponent(&|grazing, _| !grazing),
-            grazing: exponent(&|grazing, _| grazing),
-            highlight: exponent(&|_, bright| bright),
+            all: exponent(&|_| true),
+            interior: exponent(&|grazing| !grazing),
+            grazing: exponent(&|grazing| grazing),
         }
     }
 }

@@ -3,16 +3,23 @@
 
 use crate::session::{Errors, Session, nominal, with_directions_off};
 use gonia_brdf::model::{Brdf, Ggx};
-use gonia_brdf::{Elementary, Grid};
-use gonia_pipeline::budget::{CellUncertainty, Effect, budget_of};
+use gonia_brdf::{Direction, Elementary, Grid, Sample};
+use gonia_pipeline::budget::{CellUncertainty, Effect, Equation, Shape, Slant, budget_of};
 use gonia_pipeline::process::{Masks, process};
 use gonia_pipeline::{FillOptions, Filled, fill, silent};
 use gonia_rig::{Budget, Input, Scale};
+use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// An error is so many times what is stated: it must show.
-const SCALE: f64 = 4.0;
+/// An error is so many times what is stated: it must show. A reference that is tilted or raised by so much is noticed, and
+/// its frames are refused: such errors are as stated.
+fn scale(input: Input) -> f64 {
+    match input {
+        Input::ReferenceTilt | Input::ReferenceHeight => 1.0,
+        _ => 4.0,
+    }
+}
 /// Of these standard uncertainties, along and across.
 const SIZES: [f64; 2] = [1.0, -1.5];
 /// Fewer poses determine cells less well.
@@ -33,20 +40,25 @@ fn material() -> Arc<dyn Brdf> {
     })
 }
 
-/// A session's cells.
-fn filled(errors: Errors) -> (Filled, Budget) {
-    let rig = nominal(SCALE);
+/// A session's samples.
+fn sampled(errors: Errors, scale: f64) -> (Vec<Sample>, Budget) {
+    let rig = nominal(scale);
     let session = Session::new(&rig, material(), errors, (SEED, POSES));
     let go = &|_, _| ControlFlow::Continue(());
     let mut done = process(&rig, &session, &Masks::default(), go).expect("frames are sound");
     with_directions_off(&mut done.samples, &session.errors);
     let budget = budget_of(&rig, done.calibration, &done.samples);
+    (done.samples, budget)
+}
+
+/// A session's cells.
+fn filled(errors: Errors, scale: f64, with_errors: bool) -> (Filled, Budget) {
+    let (samples, budget) = sampled(errors, scale);
     let options = FillOptions {
-        with_errors: true,
+        with_errors,
         ..FillOptions::with_step_deg(STEP_DEG)
     };
-    let filled =
-        fill(done.samples, Scale::Absolute, &options, &silent).expect("samples are enough");
+    let filled = fill(samples, Scale::Absolute, &options, &silent).expect("samples are enough");
     (filled, budget)
 }
 
@@ -61,6 +73,8 @@ pub struct Alone {
     pub within: f64,
     /// … and of the noise alone: of cells in which the budget says that the error is more than the noise.
     pub left_out: f64,
+    /// How many cells those are.
+    pub shown_by: usize,
 }
 
 /// A session without errors, which others are compared with.
@@ -73,7 +87,7 @@ pub struct Baseline {
 impl Baseline {
     /// Of noise alone.
     pub fn new() -> Self {
-        let (filled, budget) = filled(Errors::one(Input::Reference, 0.0, [0.0; 2]));
+        let (filled, budget) = filled(Errors::one(Input::Reference, 0.0, [0.0; 2]), 1.0, true);
         let grid = filled.dense.grid;
         let origin = &filled.errors.as_ref().expect("asked for").origin;
         let cells = cells(grid).filter(|cell| origin[*cell] != 3).collect();
@@ -87,7 +101,8 @@ impl Baseline {
     /// What an error of one input changes.
     pub fn with_error_of(&self, input: Input) -> Alone {
         let grid = self.filled.dense.grid;
-        let (found, _) = filled(Errors::one(input, SCALE, SIZES));
+        let scale = scale(input);
+        let (found, _) = filled(Errors::one(input, scale, SIZES), scale, false);
         let plane = &self.filled.dense.planes[1];
         let noise = &self
             .filled
@@ -99,7 +114,8 @@ impl Baseline {
             .into_iter()
             .fold(self.budget.clone(), |of, other| {
                 if other == input {
-                    of
+                    let stated = of.value(input);
+                    of.with(other, scale * stated)
                 } else {
                     of.with(other, 0.0)
                 }
@@ -114,7 +130,7 @@ impl Baseline {
             let change = f64::from(found.dense.planes[1][*cell]) / value - 1.0;
             let effects = cells.effects(light, view);
             let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
-            let stated: Vec<f64> = of_input.map(|effect| effects.of(effect)).collect();
+            let stated: Vec<f64> = of_input.clone().map(|effect| effects.of(effect)).collect();
             let scatter = (f64::from(noise[*cell]) / value).powi(2);
             // Cells count by how well noise and interpolation let them be known.
             let weight = 1.0 / scatter.max(1e-8);
@@ -124,7 +140,7 @@ impl Baseline {
                 (0..2).for_each(|k| xx[j][k] += weight * pair[j] * pair[k]);
             }
             yy += weight * change * change;
-            let u: f64 = stated.iter().map(|share| share * share).sum();
+            let u: f64 = of_input.map(|effect| effects.square(effect)).sum();
             if u > scatter {
                 shows += 1.0;
                 within += f64::from(change.abs() <= 2.0 * (u + scatter).sqrt());
@@ -138,7 +154,90 @@ impl Baseline {
             explained: (sizes[0] * xy[0] + sizes[1] * xy[1]) / yy,
             within: within / shows.max(1.0),
             left_out: left_out / shows.max(1.0),
+            shown_by: shows as usize,
         }
+    }
+}
+
+/// What an error of an input of reference, lamp or camera changes the samples by: its size by least squares over the true
+/// one, the share of the changes' sum of squares that the equation explains, and how many samples there are in the
+/// session without and with it.
+#[allow(dead_code)] // The bench counts cells alone.
+pub fn samples_with_error_of(input: Input) -> (f64, f64, [usize; 2]) {
+    let scale = scale(input);
+    let (sound, budget) = sampled(Errors::one(input, 0.0, [0.0; 2]), scale);
+    let (off, _) = sampled(Errors::one(input, scale, SIZES), scale);
+    let equation = Equation::new(&budget);
+    let mut frames: HashMap<u32, [f64; 2]> = HashMap::new();
+    for sample in &sound {
+        let [sum, count] = frames.entry(sample.frame).or_default();
+        *sum += f64::from(sample.rgb[1]);
+        *count += 1.0;
+    }
+    let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
+    for (sample, found) in sound.iter().zip(&off) {
+        let value = f64::from(sample.rgb[1]);
+        let change = f64::from(found.rgb[1]) / value - 1.0;
+        if !change.is_finite() || value <= 0.0 {
+            continue;
+        }
+        let [sum, count] = frames[&sample.frame];
+        let light = Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into());
+        let view = Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into());
+        let material = material();
+        let at = |(i, v): (Direction, Direction)| material.eval(i.to_vec3(), v.to_vec3())[1];
+        let shape = Shape {
+            value,
+            surround: sum / count,
+            ..shape_of(light, view, &at)
+        };
+        let effects = equation.at(&Slant::of(light), &Slant::of(view), &shape);
+        let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
+        let stated: Vec<f64> = of_input.map(|effect| effects.of(effect)).collect();
+        let pair = [stated[0], stated.get(1).copied().unwrap_or(0.0)];
+        for j in 0..2 {
+            xy[j] += pair[j] * change;
+            (0..2).for_each(|k| xx[j][k] += pair[j] * pair[k]);
+        }
+        yy += change * change;
+    }
+    let sizes = solved(xx, xy);
+    let size = |of: [f64; 2]| of[0].hypotenuse(of[1]);
+    let ratio = size(sizes) / size(true_sizes(input));
+    let explained = (sizes[0] * xy[0] + sizes[1] * xy[1]) / yy;
+    (ratio, explained, [sound.len(), off.len()])
+}
+
+/// Second derivatives of a BRDF over light and over view, in the tangent plane, per square radian.
+fn shape_of(
+    light: Direction,
+    view: Direction,
+    at: &dyn Fn((Direction, Direction)) -> f64,
+) -> Shape {
+    const H: f64 = 0.01;
+    let about = |d: Direction| {
+        let d = d.to_vec3();
+        let flat = d[0].hypotenuse(d[1]).max(1e-9);
+        let across = [-d[1] / flat, d[0] / flat, 0.0];
+        let along = [
+            -across[1] * d[2],
+            across[0] * d[2],
+            across[1] * d[0] - across[0] * d[1],
+        ];
+        [across, along].map(|axis| {
+            [H, -H].map(|h| {
+                let to = [0, 1, 2].map(|k| d[k] + h * axis[k]);
+                Direction::from_vec3(gonia_brdf::direction::normalize(to))
+            })
+        })
+    };
+    let value = at((light, view));
+    let bend = |values: Vec<f64>| (values.iter().sum::<f64>() - 4.0 * value) / (H * H);
+    let lights = about(light).into_iter().flatten().map(|i| at((i, view)));
+    let views = about(view).into_iter().flatten().map(|v| at((light, v)));
+    Shape {
+        bends: [bend(lights.collect()), bend(views.collect())],
+        ..Shape::default()
     }
 }
 

@@ -110,7 +110,7 @@ pub fn count(
         }
         let found = f64::from(bar.plane[cell]);
         let effects = cells.effects(light, view);
-        let shares: f64 = Effect::ALL.iter().map(|e| effects.of(*e).powi(2)).sum();
+        let shares: f64 = Effect::ALL.iter().map(|e| effects.square(*e)).sum();
         let u = (f64::from(bar.noise[cell]).powi(2) + found * found * shares).sqrt();
         let off = (truth - found) / u;
         let steep = d_light.theta_deg().max(d_view.theta_deg()) > 75.0;

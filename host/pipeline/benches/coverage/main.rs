@@ -112,18 +112,21 @@ fn main() {
 
 /// Prints what each input's error changes by itself.
 fn each_alone() {
-    println!("\n| error alone | size found over true | explained, % | within U, % | left out, % |");
-    println!("|---|---|---|---|---|");
+    println!(
+        "\n| error alone | size found over true | explained, % | within U, % | left out, % | cells |"
+    );
+    println!("|---|---|---|---|---|---|");
     let baseline = Baseline::new();
     for input in Input::ALL {
         let of = baseline.with_error_of(input);
         println!(
-            "| {} | {:.2} | {:.1} | {:.1} | {:.1} |",
+            "| {} | {:.2} | {:.1} | {:.1} | {:.1} | {} |",
             input.key(),
             of.ratio,
             100.0 * of.explained,
             100.0 * of.within,
-            100.0 * of.left_out
+            100.0 * of.left_out,
+            of.shown_by
         );
     }
 }

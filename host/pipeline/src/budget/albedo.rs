@@ -47,7 +47,7 @@ pub fn albedo_uncertainty(cells: &CellBudget<'_>, theta_i_deg: f64) -> AlbedoUnc
         }
     }
     let square = |of: f64| of * of;
-    let known: f64 = Effect::ALL.map(|e| square(effects.of(e))).iter().sum();
+    let known: f64 = Effect::ALL.map(|e| effects.square(e)).iter().sum();
     let scatter: f64 = noise.into_iter().map(square).sum();
     AlbedoUncertainty {
         theta_i_deg: ring as f64 * step_deg,

@@ -21,6 +21,9 @@ struct Node {
     per_span: [f64; 2],
     /// … and one over the square of half of it; zero at the rim, where one of them is the node itself.
     per_square: [f64; 2],
+    /// Nodes beside it on its ring lie nearer to the pole than the great circle across its meridian does: what that takes
+    /// from the second derivative across, per slope along (cot θ for near ones).
+    ring: f64,
     /// Views that the same frame shows.
     around: [u32; AROUND],
 }
@@ -44,7 +47,7 @@ impl<'a> CellUncertainty<'a> {
         })
     }
 
-    /// The effects at a cell, by the indices of its light and view.
+    /// The effects at a cell, by the indices of its light and view. The table is reciprocal, as every fill is.
     pub fn effects(&self, light: usize, view: usize) -> Effects {
         let (at_light, at_view) = (&self.nodes[light], &self.nodes[view]);
         let n = self.grid.n_directions();
@@ -61,6 +64,8 @@ impl<'a> CellUncertainty<'a> {
             slopes[2 + axis] = (after - before) * at_view.per_span[axis];
             bends[1] += (after + before - 2.0 * value) * at_view.per_square[axis];
         }
+        bends[0] += slopes[0] * at_light.ring;
+        bends[1] += slopes[2] * at_view.ring;
         let around: f64 = at_view.around.iter().map(|v| at(i, *v)).sum();
         let shape = Shape {
             value,
@@ -68,7 +73,8 @@ impl<'a> CellUncertainty<'a> {
             bends,
             surround: around / AROUND as f64,
         };
-        self.equation.at(&at_light.slant, &at_view.slant, &shape)
+        self.equation
+            .of_reciprocal(&at_light.slant, &at_view.slant, &shape)
     }
 }
 
@@ -120,7 +126,7 @@ fn node(grid: Grid, index: usize) -> Node {
     let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
     let step = grid.step_deg().to_radians();
     let (theta, phi) = (index / n_phi, index % n_phi);
-    let sine = (theta as f64 * step).sine();
+    let (sine, cosine) = (theta as f64 * step).sine_cosine();
     let at = |theta: usize, phi: usize| (theta * n_phi + phi % n_phi) as u32;
     let opposite = phi + n_phi / 2;
     // Along the meridian, over the pole where it is near, and ending at the rim.
@@ -143,22 +149,26 @@ fn node(grid: Grid, index: usize) -> Node {
             return (
                 [at(ring, phi + quarter), at(ring, phi + n_phi - quarter)],
                 ring as f64 * step,
+                0.0,
             );
         }
         let steps = ((wide / sine).ceil() as usize).clamp(1, quarter);
-        let half = (sine * (steps as f64 * step).sine()).max(sine * step);
+        let turn = steps as f64 * step;
+        let half = (sine * turn.sine()).max(sine * step);
+        let nearer = sine * cosine * (1.0 - turn.cosine());
         (
             [at(theta, phi + steps), at(theta, phi + n_phi - steps)],
             half,
+            2.0 * nearer / (half * half),
         )
     };
     let (meridian, past) = along(1);
-    let (ring, half) = across(STEP_DEG.max(grid.step_deg()));
+    let (ring, half, nearer) = across(STEP_DEG.max(grid.step_deg()));
     let wide = ((FRAME_DEG.to_radians() / step).round() as usize)
         .max(1)
         .min(n_theta - 1);
     let (far, _) = along(wide);
-    let (side, _) = across(FRAME_DEG);
+    let (side, ..) = across(FRAME_DEG);
     let corner = |far: u32, side: u32| {
         let ring = far as usize / n_phi;
         at(ring, side as usize % n_phi)
@@ -182,6 +192,7 @@ fn node(grid: Grid, index: usize) -> Node {
             if is_rim { 0.0 } else { 1.0 / (step * step) },
             1.0 / (half * half),
         ],
+        ring: nearer,
         around,
     }
 }
@@ -300,7 +311,8 @@ mod tests {
                 let by_cells = cells.effects(light, view);
                 let (i, v) = (grid.direction(light), grid.direction(view));
                 let shape = shape(&places(i, v).map(at));
-                let by_function = equation.at(&Slant::of(i), &Slant::of(v), &shape);
+                let slants = (Slant::of(i), Slant::of(v));
+                let by_function = equation.of_reciprocal(&slants.0, &slants.1, &shape);
                 for part in [Part::Scale, Part::Direction] {
                     let (a, b) = (by_cells.u(part), by_function.u(part));
                     assert!((a - b).abs() < 0.06 * b, "{theta} {tv} {part:?} {a} {b}");

@@ -104,35 +104,48 @@ impl Effect {
 }
 
 /// What the effects at a pair of directions change a value by, as shares of it, each for an error of one standard
-/// uncertainty, with its sign.
+/// uncertainty, with its sign: of what is measured there, and of what is measured with light and view exchanged. A value of a
+/// reciprocal table follows from either or both, and nobody knows how much from which: its uncertainty is the root mean
+/// square of the two, which is right where it follows from one of them and cautious where from both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Effects([f64; EFFECTS]);
+pub struct Effects([[f64; EFFECTS]; 2]);
 
 impl Effects {
-    /// The share of one effect.
+    /// The share of one effect, the mean of both measurements.
     pub fn of(&self, effect: Effect) -> f64 {
-        self.0[effect as usize]
+        let [there, exchanged] = self.sides(effect);
+        0.5 * (there + exchanged)
+    }
+
+    /// The shares of one effect on what is measured there and with light and view exchanged.
+    pub fn sides(&self, effect: Effect) -> [f64; 2] {
+        self.0.map(|side| side[effect as usize])
+    }
+
+    /// The square of the relative standard uncertainty by one effect.
+    pub fn square(&self, effect: Effect) -> f64 {
+        let [there, exchanged] = self.sides(effect);
+        0.5 * (there * there + exchanged * exchanged)
     }
 
     /// The relative standard uncertainty of a part.
     pub fn u(&self, part: Part) -> f64 {
         // Those of the scale come first.
-        let (scale, direction) = self.0.split_at(Effect::LightTheta as usize);
-        let of_part = match part {
-            Part::Scale => scale,
-            Part::Direction => direction,
-        };
-        of_part
-            .iter()
-            .map(|share| share * share)
-            .sum::<f64>()
-            .sqrt()
+        let split = Effect::LightTheta as usize;
+        let squares = |of: &[f64]| of.iter().map(|share| share * share).sum::<f64>();
+        let sides = self.0.each_ref().map(|side| match part {
+            Part::Scale => squares(&side[..split]),
+            Part::Direction => squares(&side[split..]),
+        });
+        (0.5 * (sides[0] + sides[1])).sqrt()
     }
 
     /// Adds another's, effect by effect, times a weight: an error acts in all cells alike.
     pub fn add(&mut self, other: &Self, weight: f64) {
         for (sum, of) in self.0.iter_mut().zip(&other.0) {
-            *sum += weight * of;
+            for (sum, of) in sum.iter_mut().zip(of) {
+                *sum += weight * of;
+            }
         }
     }
 }
@@ -148,6 +161,20 @@ pub struct Shape {
     pub bends: [f64; 2],
     /// The mean over the views that the same frame shows.
     pub surround: f64,
+}
+
+impl Shape {
+    /// The surroundings of the pair with light and view exchanged, where the BRDF is the same. The frame that has the
+    /// value there is taken to show the same mean.
+    fn exchanged(&self) -> Self {
+        let [light_theta, light_phi, view_theta, view_phi] = self.slopes;
+        let [light, view] = self.bends;
+        Self {
+            slopes: [view_theta, view_phi, light_theta, light_phi],
+            bends: [view, light],
+            ..*self
+        }
+    }
 }
 
 /// A direction as the equation needs it.
@@ -193,6 +220,8 @@ pub struct Equation {
     inputs: [f64; EFFECTS],
     /// Half the variance of the directions of light and view over a patch.
     patch: [f64; 2],
+    /// The share of a frame that shows the sample from straight above, and what the rest adds to the sample's mean.
+    frame: [f64; 2],
 }
 
 impl Equation {
@@ -215,11 +244,23 @@ impl Equation {
             light_mm: budget.light_mm,
             inputs,
             patch: [patch(budget.light_mm), patch(budget.camera_mm)],
+            frame: [budget.frame_share, budget.surround],
         }
     }
 
-    /// The effects at a pair of directions; all zero of a value that is not positive, of which nothing is a share.
+    /// The effects at a pair of directions of a BRDF that is made reciprocal: on what is measured there and with light and
+    /// view exchanged.
+    pub fn of_reciprocal(&self, light: &Slant, view: &Slant, shape: &Shape) -> Effects {
+        let there = self.shares(light, view, shape);
+        Effects([there, self.shares(view, light, &shape.exchanged())])
+    }
+
+    /// The effects on a value that was measured at a pair of directions; all zero of a value that is not positive, of which nothing is a share.
     pub fn at(&self, light: &Slant, view: &Slant, shape: &Shape) -> Effects {
+        Effects([self.shares(light, view, shape); 2])
+    }
+
+    fn shares(&self, light: &Slant, view: &Slant, shape: &Shape) -> [f64; EFFECTS] {
         let Shape {
             value,
             slopes,
@@ -227,7 +268,7 @@ impl Equation {
             surround,
         } = *shape;
         if value.is_nan() || value <= 0.0 {
-            return Effects::default();
+            return [0.0; EFFECTS];
         }
         let per_value = 1.0 / value;
         let mut effects = [0.0; EFFECTS];
@@ -251,7 +292,11 @@ impl Equation {
         let bright = self.level * per_value;
         set(Effect::Linearity, -bright.decimal_log());
         set(Effect::Offset, (bright - 1.0) * light.per_cosine);
-        set(Effect::StrayLight, surround * per_value - 1.0);
+        // Of the sample, less what the reference (else the mean of the samples) has, over the part of the frame that
+        // shows them.
+        let [share, rest] = self.frame;
+        let spread = (surround + rest) * per_value - (1.0 + rest / self.level);
+        set(Effect::StrayLight, share * view.cosine * spread);
         set(Effect::LightTheta, light_slope);
         set(Effect::LightPhi, slopes[1] * per_value);
         set(Effect::ViewTheta, slopes[2] * per_value);
@@ -261,7 +306,7 @@ impl Equation {
         set(Effect::Lens, bends[1]);
         let over_patch = self.patch[0] * bends[0] + self.patch[1] * bends[1];
         set(Effect::Patch, over_patch);
-        Effects(effects)
+        effects
     }
 }
 
@@ -275,6 +320,8 @@ mod tests {
     const LEVEL: f64 = 0.3;
     const LIGHT_MM: f64 = 900.0;
     const CAMERA_MM: f64 = 1500.0;
+    /// The sample's share of the frame from straight above, and what the rest adds to its mean.
+    const FRAME: [f64; 2] = [0.4, 0.02];
 
     /// Something smooth with slopes in all directions, which is not isotropic.
     fn brdf(light: Vec3, view: Vec3) -> f64 {
@@ -329,7 +376,8 @@ mod tests {
         let departs = |d: Vec3| e.angle * (1.0 - d[2]).powi(2);
         let reference = LEVEL / (1.0 + e.reference + departs(light) + departs(view));
         let signal = |value: f64, around: f64, irradiance: f64| {
-            value * irradiance + e.stray * around * irradiance + e.offset * LEVEL * above
+            let mean = FRAME[0] * view[2] * (around + FRAME[1]);
+            (value + e.stray * mean) * irradiance + e.offset * LEVEL * above
         };
         let on_it = irradiance(true_light, [0.0; 2], 0.0);
         let material = signal(f, surround, on_it) * (1.0 + e.drift);
@@ -370,7 +418,7 @@ mod tests {
             (value, KnownFrom::Stated)
         };
         let lengths = [LIGHT_MM, CAMERA_MM, 14.0];
-        Equation::new(&Budget::new(calibration, LEVEL, lengths, of))
+        Equation::new(&Budget::new(calibration, LEVEL, lengths, of).with_frame(FRAME))
     }
 
     #[test]
@@ -465,6 +513,48 @@ mod tests {
         ] {
             let said = effects.of(effect) * shape.value;
             assert!((said - mean).abs() < 1e-9, "{effect:?} {said} {mean}");
+        }
+    }
+
+    #[test]
+    fn a_reciprocal_value_has_the_effects_of_either_measurement() {
+        let (light, view) = (
+            Direction::from_deg(70.0, 20.0),
+            Direction::from_deg(0.0, 0.0),
+        );
+        let slants = (Slant::of(light), Slant::of(view));
+        let shape = Shape {
+            value: 0.3,
+            slopes: [0.4, 0.1, -0.2, 0.0],
+            bends: [-1.0, 3.0],
+            surround: 0.3,
+        };
+        let equation = equation(ReferenceCalibration::KnownReference);
+        let one = equation.at(&slants.0, &slants.1, &shape);
+        let both = equation.of_reciprocal(&slants.0, &slants.1, &shape);
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
+        // The reference's error is the same in both; light from straight above does not show a tilt; the light stood where
+        // the view is, and its error acts by the slope there.
+        assert!(close(both.of(Effect::Reference), one.of(Effect::Reference)));
+        let tilt = one.of(Effect::ReferenceTiltX);
+        for (effect, sides) in [
+            (Effect::ReferenceTiltX, [tilt, 0.0]),
+            (
+                Effect::LightTheta,
+                [0.4, -0.2].map(|slope| SMALL * slope / 0.3),
+            ),
+            (
+                Effect::ViewTheta,
+                [-0.2, 0.4].map(|slope| SMALL * slope / 0.3),
+            ),
+        ] {
+            let found = both.sides(effect);
+            assert!(
+                (0..2).all(|k| (found[k] - sides[k]).abs() < 1e-12),
+                "{effect:?} {found:?}"
+            );
+            let square = 0.5 * (sides[0].powi(2) + sides[1].powi(2));
+            assert!(close(both.square(effect), square), "{effect:?}");
         }
     }
 

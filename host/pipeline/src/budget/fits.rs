@@ -7,7 +7,8 @@ use gonia_brdf::{DenseBrdf, Direction};
 use gonia_rig::Budget;
 
 /// Of each effect that changes anything, by which share of its value it changes each cell and channel: slopes are those
-/// of the dense BRDF at the nearest nodes.
+/// of the dense BRDF at the nearest nodes. Each has two rows, for what is measured there and with light and view
+/// exchanged: half of the variance is that of either.
 pub(crate) fn shared_errors(
     dense: &DenseBrdf,
     budget: &Budget,
@@ -33,14 +34,16 @@ pub(crate) fn shared_errors(
         })
     };
     let all: Vec<[Effects; 3]> = cells.iter().map(of_cell).collect();
-    let of_effect = |effect: Effect| -> Vec<[f64; 3]> {
-        let shares = |of: &[Effects; 3]| [0, 1, 2].map(|c| of[c].of(effect));
+    let of_side = |(effect, side): (Effect, usize)| -> Vec<[f64; 3]> {
+        let share = |of: &Effects| of.sides(effect)[side] * std::f64::consts::FRAC_1_SQRT_2;
+        let shares = |of: &[Effects; 3]| of.each_ref().map(share);
         all.iter().map(shares).collect()
     };
     let changes = |shares: &Vec<[f64; 3]>| shares.iter().flatten().any(|share| *share != 0.0);
     Effect::ALL
         .into_iter()
-        .map(of_effect)
+        .flat_map(|effect| [(effect, 0), (effect, 1)])
+        .map(of_side)
         .filter(changes)
         .collect()
 }

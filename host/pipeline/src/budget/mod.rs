@@ -15,7 +15,8 @@
 //!
 //! Each input ([`Input`](gonia_rig::Input)) has a standard uncertainty, stated in `rig.toml`, found by the calibration, or a cautious
 //! default. [`Equation`] tells by which share each of these errors changes a value ([`Effect`]): an error of one
-//! standard uncertainty, with its sign, since one error acts in all cells. Effects are independent of each other;
+//! standard uncertainty, with its sign, since one error acts in all cells. A cell of a reciprocal table has the
+//! effects at its directions or those with light and view exchanged: their root mean square. Effects are independent of each other;
 //! the uncertainty of a cell is the root of their squares' sum, with that of noise and interpolation; that of a sum
 //! over cells follows from each effect's sum.
 //!
@@ -79,7 +80,36 @@ pub fn budget_of(rig: &Rig, calibration: ReferenceCalibration, samples: &[Sample
         1000.0 * rig.camera.distance_m,
         rig.sampling.patch_mm,
     ];
-    Budget::new(calibration, level(rig, calibration, samples), lengths, of)
+    let level = level(rig, calibration, samples);
+    Budget::new(calibration, level, lengths, of).with_frame(frame(rig, calibration, level))
+}
+
+/// Reflectance that the target's lines are taken to have: they are bright, so that they are found …
+const LINES: f64 = 0.9;
+/// … and of what else a frame shows: black paint or cloth.
+const AROUND: f64 = 0.05;
+
+/// The share of a frame from straight above that shows the sample, and what lines and the rest add to the sample's mean
+/// over that share, in the unit of the values; of values without a unit, white is taken to be as bright as the samples'
+/// mean.
+fn frame(rig: &Rig, calibration: ReferenceCalibration, level: f64) -> [f64; 2] {
+    let (camera, target) = (&rig.camera, &rig.target);
+    let side_mm = 2.0 * target.material_half_mm;
+    let side_px = |focal_px: f64| side_mm * focal_px / (1000.0 * camera.distance_m);
+    let across = side_px(camera.focal_px) / camera.width_px as f64;
+    let along = side_px(camera.focal_y_px.unwrap_or(camera.focal_px)) / camera.height_px as f64;
+    let share = across.min(1.0) * along.min(1.0);
+    let white = if calibration.is_absolute() {
+        1.0 / PI
+    } else {
+        level
+    };
+    // Four lines, each as long as the square that they make.
+    let lines = 8.0 * target.line_offset_mm * target.line_width_mm / (side_mm * side_mm);
+    [
+        share,
+        white * (LINES * lines + AROUND * (1.0 / share - 1.0)),
+    ]
 }
 
 /// So many samples tell what holds for all of them.

@@ -9,16 +9,11 @@ use gonia_rig::Stratum;
 /// Name of the fact in the provenance of a dense BRDF that says how its errors of interpolation fall with more poses.
 const ERROR_FALL: &str = "error_fall";
 /// Its parts.
-const PARTS: [Stratum; 4] = [
-    Stratum::All,
-    Stratum::Interior,
-    Stratum::Grazing,
-    Stratum::Highlight,
-];
+const PARTS: [Stratum; 3] = [Stratum::All, Stratum::Interior, Stratum::Grazing];
 
 /// The fact that says it, as [`fall_in`] reads it.
 pub(crate) fn fall_fact(fall: &ErrorFall) -> (String, String) {
-    let of = [fall.all, fall.interior, fall.grazing, fall.highlight];
+    let of = [fall.all, fall.interior, fall.grazing];
     let text = PARTS.iter().zip(of).filter_map(|(part, exponent)| {
         let exponent = exponent?;
         Some(format!("{part} {exponent:.2}"))
@@ -38,28 +33,27 @@ pub fn fall_in(provenance: &Provenance) -> Option<ErrorFall> {
             (name == part.name() && (0.0..=2.0).contains(&exponent)).then_some(exponent)
         })
     };
-    let [all, interior, grazing, highlight] = PARTS.map(of);
+    let [all, interior, grazing] = PARTS.map(of);
     Some(ErrorFall {
         all,
         interior,
         grazing,
-        highlight,
     })
 }
 
-/// The exponent that is known of a part; of one by itself, that of all.
+/// The exponent that is known of a part; of one by itself, that of all. Of highlights none is known.
 fn exponent(fall: &ErrorFall, part: Stratum) -> Option<f32> {
     let own = match part {
         Stratum::Interior => fall.interior,
         Stratum::Grazing | Stratum::Unmeasured => fall.grazing,
-        Stratum::Highlight => fall.highlight,
+        Stratum::Highlight => return None,
         Stratum::All | Stratum::Retro => None,
     };
     own.or(fall.all)
 }
 
 /// The median combined standard uncertainty (k = 1, a share of the values) of each part of the domain with so many times
-/// the poses; as it is where it is not known what these bring.
+/// the poses; `None` where it is not known what these bring.
 pub fn with_poses(
     cells: &CellBudget<'_>,
     fall: &ErrorFall,
@@ -91,14 +85,14 @@ mod tests {
             all: Some(0.75),
             interior: None,
             grazing: Some(0.5),
-            highlight: Some(2.0),
         };
         let (name, text) = fall_fact(&fall);
-        assert_eq!(text, "all 0.75, grazing 0.50, highlight 2.00");
+        assert_eq!(text, "all 0.75, grazing 0.50");
         let provenance = Provenance::from([(format!("samples.1.{name}"), text)]);
         assert_eq!(fall_in(&provenance), Some(fall));
         assert_eq!(fall_in(&Provenance::new()), None);
         assert_eq!(exponent(&fall, Stratum::Interior), Some(0.75));
+        assert_eq!(exponent(&fall, Stratum::Highlight), None);
         let odd = Provenance::from([(name, "all nan, grazing -3, highlight".into())]);
         assert_eq!(fall_in(&odd), Some(ErrorFall::default()));
     }

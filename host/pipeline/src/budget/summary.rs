@@ -86,7 +86,7 @@ impl<'a> CellBudget<'a> {
         let noise = match self.holding {
             Holding::Noise => error,
             Holding::All => {
-                let known: f64 = Effect::ALL.map(|e| effects.of(e).powi(2)).iter().sum();
+                let known: f64 = Effect::ALL.map(|e| effects.square(e)).iter().sum();
                 (error * error - known).max(0.0).sqrt()
             }
         };
@@ -103,7 +103,7 @@ impl<'a> CellBudget<'a> {
             let place = effect
                 .input()
                 .map_or(CONTRIBUTIONS - 1, |input| 1 + input as usize);
-            squares[place] += effects.of(effect).powi(2);
+            squares[place] += effects.square(effect);
         }
         Some(squares.map(f64::sqrt))
     }

@@ -120,7 +120,8 @@ impl FitOfSamples {
                     let (value, noise) = (about[0].0[c], about[0].1[c]);
                     let known = equation.as_ref().map_or(0.0, |equation| {
                         let shape = shape(&about.map(|(value, _)| value[c]));
-                        let effects = equation.at(&Slant::of(*light), &Slant::of(*view), &shape);
+                        let (light, view) = (Slant::of(*light), Slant::of(*view));
+                        let effects = equation.of_reciprocal(&light, &view, &shape);
                         value
                             * effects
                                 .u(Part::Direction)
