@@ -10,14 +10,14 @@ use gonia_formats::{CaptureFolder, check_output, rig_toml, write_whole_bytes};
 use gonia_pipeline::calibrate::{LightState, Number, NumberState, Spread};
 use gonia_pipeline::{Calibrated, calibrate};
 use gonia_report::files::CALIBRATION_FIGURE;
-use gonia_rig::rig_remarks;
+use gonia_rig::{Role, rig_remarks};
 use std::path::{Path, PathBuf};
 
 /// Finds the rig's geometry from the frames of a capture folder: the camera and its arm from the fiducial
 /// lines, the light and its arm from the shading on the reference.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia calibrate capture/                   # prints what it finds\n  gonia calibrate capture/ -o rig.toml       # and writes a rig.toml to use from now on\n\nFrames need poses of many directions; 60 of the reference are plenty. Lines are found although the\ncamera is rolled by 5 degrees, aims 40 mm aside, is 5 % nearer, or the arms' zeros are off by 2 degrees.\nWithout -o nothing is written; with it, calibration.svg beside it shows what lines and shading leave, and\ngonia report shows that picture. The rig that is written holds the numbers found and a table [calibration]\nwith their uncertainties; comments and the order of keys are not kept. A rig that was calibrated can be\ncalibrated again: its own numbers are the first guess then. The light needs frames of role 'reference'\nwhose reflectance [reference] gives, or of a reference that is smooth and reciprocal."
+    after_long_help = "Example:\n  gonia calibrate capture/                   # prints what it finds\n  gonia calibrate capture/ -o rig.toml       # and writes a rig.toml to use from now on\n\nFrames need poses of many directions; 60 of the reference are plenty. Lines are found although the\ncamera is rolled by 5 degrees, aims 40 mm aside, is 5 % nearer, or the arms' zeros are off by 2 degrees.\nWithout -o nothing is written; with it, calibration.svg beside it shows what lines and shading leave, and\ngonia report shows that picture. The rig that is written holds the numbers found and a table [calibration]\nwith their uncertainties; comments and the order of keys are not kept. A rig that was calibrated can be\ncalibrated again: its own numbers are the first guess then. The light needs frames of role 'reference'\nwhose reflectance [reference] gives, or of a reference that is smooth and reciprocal; without any, a matt\nmaterial shows it too, less well."
 )]
 pub struct Calibrate {
     /// The capture folder
@@ -153,6 +153,7 @@ fn describe_light(light: &LightState) -> Vec<(String, String)> {
     let row = |name: &str, value: String| (name.to_owned(), value);
     match *light {
         LightState::Found {
+            surface,
             frames,
             shading,
             lamp,
@@ -161,9 +162,13 @@ fn describe_light(light: &LightState) -> Vec<(String, String)> {
             row(
                 "shading",
                 format!(
-                    "{:.2} % off before, {:.2} % after (RMS, median of {frames} frames of the reference)",
+                    "{:.2} % off before, {:.2} % after (RMS, median of {frames} frames of the {})",
                     100.0 * shading[0],
-                    100.0 * shading[1]
+                    100.0 * shading[1],
+                    match surface {
+                        Role::Material => "material, of which nothing is known",
+                        _ => "reference",
+                    }
                 ),
             ),
             row("lamp", format!("steady within {:.2} %", 100.0 * lamp)),
@@ -184,16 +189,40 @@ fn describe_light(light: &LightState) -> Vec<(String, String)> {
         LightState::NoReference { frames, needed } => vec![row(
             "light",
             format!(
-                "left as it is: {frames} frames of the reference show anything, and {needed} are needed"
+                "left as it is: {frames} frames of the reference, or without one of the material, show anything, and {needed} are needed"
             ),
         )],
-        LightState::ReferenceUnlike { level, within } => vec![row(
-            "light",
-            format!(
-                "left as it is: the reference does not scatter as rig.toml says (levels differ by {:.1} %, values of a frame by {:.1} %); give its reflectance, or a more diffuse one",
+        LightState::Unlike {
+            surface,
+            level,
+            within,
+        } => {
+            let by = format!(
+                "levels differ by {:.1} %, values of a frame by {:.1} %",
                 100.0 * level,
                 100.0 * within
-            ),
-        )],
+            );
+            let why = match surface {
+                Role::Material => format!(
+                    "left as it is: the material is not smooth enough to show it ({by}); take frames of a white reference, or of a mirror"
+                ),
+                _ => format!(
+                    "left as it is: the reference does not scatter as rig.toml says ({by}); give its reflectance, or a more diffuse one"
+                ),
+            };
+            vec![row("light", why)]
+        }
+        LightState::NotTold { frames, u_deg } => {
+            let told = match u_deg {
+                Some(u_deg) => format!("tell its directions to {u_deg:.2} deg only"),
+                None => "do not tell where it is".to_owned(),
+            };
+            vec![row(
+                "light",
+                format!(
+                    "left as it is: {frames} frames of the material {told}; take frames of a white reference, or of a mirror"
+                ),
+            )]
+        }
     }
 }

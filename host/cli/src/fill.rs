@@ -298,19 +298,24 @@ fn uncertainty_rows(
 }
 
 /// Where the cells' values come from.
-fn origins(counts: &OriginCounts) -> [(String, String); 4] {
+fn origins(counts: &OriginCounts) -> Vec<(String, String)> {
     let guessed = 100.0 * counts.extrapolated_share();
     let extrapolated = table::count(counts.extrapolated);
-    [
+    let symmetric =
+        (counts.symmetric > 0).then(|| ("cells by symmetry", table::count(counts.symmetric)));
+    let known = [
         ("cells measured", table::count(counts.measured)),
         ("cells by reciprocity", table::count(counts.reciprocal)),
+    ];
+    let others = [
         ("cells interpolated", table::count(counts.interpolated)),
         (
             "cells extrapolated",
             format!("{extrapolated} ({guessed:.1} %)"),
         ),
-    ]
-    .map(|(name, text)| (name.to_owned(), text))
+    ];
+    let all = known.into_iter().chain(symmetric).chain(others);
+    all.map(|(name, text)| (name.to_owned(), text)).collect()
 }
 
 /// The share of the light that is reflected: of colours in green at three polar angles, and the highest of all.

@@ -10,6 +10,10 @@ use gonia_rig::Rig;
 use std::io::Write;
 use std::path::Path;
 
+/// A focal length that differs by no more than this share is one of the same camera: masks are of a frame's pixels,
+/// whatever its focal length is thought to be, and a calibration finds it up to 5 % from where it was.
+const SAME_CAMERA: f64 = 0.05;
+
 /// The mask of one pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaskRow {
@@ -23,7 +27,7 @@ pub struct MaskRow {
 ///
 /// # Errors
 /// One line naming the file and its line: a missing column, a number that is none, frames of another
-/// size or focal length, or a mask that is not base64.
+/// size or a focal length that differs by more than 5 %, or a mask that is not base64.
 pub fn read_masks_csv(path: &Path, rig: &Rig) -> Result<Vec<MaskRow>, FileError> {
     let table = NamedTable::open(path, &["theta_i_deg", "width_px", "mask"], 7)?;
     let angles = table.angles()?;
@@ -39,13 +43,14 @@ pub fn read_masks_csv(path: &Path, rig: &Rig) -> Result<Vec<MaskRow>, FileError>
     while rows.advance()? {
         let size: [usize; 2] = [rows.number(width)?, rows.number(height)?];
         let focal_px: f64 = rows.number(focal)?;
-        if size != [camera.width_px, camera.height_px] || focal_px != camera.focal_px {
+        let is_same = (focal_px - camera.focal_px).abs() <= SAME_CAMERA * camera.focal_px;
+        if size != [camera.width_px, camera.height_px] || !is_same {
             return Err(rows.wrong(
                 format_args!(
-                    "the mask is of a frame of {} x {} pixels and a focal length of {focal_px}, but rig.toml has {} x {} and {}",
+                    "the mask is of a frame of {} x {} pixels and a focal length of {focal_px} pixels, but rig.toml has {} x {} and {}",
                     size[0], size[1], camera.width_px, camera.height_px, camera.focal_px
                 ),
-                "use masks of the same camera",
+                "use masks of the same camera, or take the file away and run process on the reference's frames again",
             ));
         }
         let text = rows.text(mask);
@@ -130,6 +135,17 @@ mod tests {
             error.contains("masks.csv, line 2: the mask is of a frame of 64 x 64"),
             "{error}"
         );
+        // A calibration finds another focal length of the same camera; another lens has another one.
+        let mut other = rig.clone();
+        for by in [1.0 + 1e-9, 0.996, 1.049] {
+            other.camera.focal_px = by * rig.camera.focal_px;
+            assert_eq!(read_masks_csv(&path, &other).unwrap().len(), 2, "{by}");
+        }
+        for by in [0.9, 1.1, f64::NAN] {
+            other.camera.focal_px = by * rig.camera.focal_px;
+            let error = read_masks_csv(&path, &other).unwrap_err().to_string();
+            assert!(error.contains("a focal length of 100 pixels"), "{error}");
+        }
         let text = std::fs::read_to_string(&path)
             .unwrap()
             .replace("AQL/", "A?L/");

@@ -244,6 +244,10 @@ pub const FIGURES: &[Figure] = &[
         "cargo bench -p gonia --bench adaptive -- --out {work}",
     )])
     .with(&[("adaptive.svg", "adaptive.svg")]),
+    figure("exports", 0.5, Tables, &[
+        QUICK,
+        run("cargo bench -p gonia --bench exports -- {work}/quick/dense.exr"),
+    ]),
     figure("plan", 0.1, Text, &[
         GONIA,
         QUICK,

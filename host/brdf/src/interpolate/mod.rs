@@ -17,6 +17,7 @@ pub mod cross_validation;
 pub mod data;
 pub mod datum;
 pub mod error_bars;
+mod error_fall;
 pub mod exponential;
 pub mod fill;
 pub mod from_corners;
@@ -33,8 +34,9 @@ pub use by_rows::{Band, KeptCells, Rows, Solver};
 pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};
+pub use error_fall::ErrorFall;
 pub use fill::{FillError, fill, fill_with_errors};
-pub use origin::{IsotropicOrigins, Origin, OriginCounts, origins};
+pub use origin::{IsotropicOrigins, Origin, OriginCounts, origins, origins_with_images};
 pub use select::{Candidate, Selection, select};
 
 /// How to interpolate.

@@ -59,6 +59,7 @@ pub fn solve_camera(
             Own::Usual | Own::Unknown => &lines::OWN,
         },
         least_own: &lines::LEAST_OWN,
+        most_own: &[f64::INFINITY; lines::OWN.len()],
         least_noise: lines::LEAST_NOISE,
         finds_noise: matches!(own, Own::Unknown),
     };

@@ -7,12 +7,12 @@ use crate::calibrate::mirror::{self, MirrorLight};
 use crate::calibrate::numbers::{Alternatives, LightSolution, among_all};
 use crate::calibrate::residuals::ShadingResidual;
 use crate::calibrate::shading::{
-    LEAST_OWN, LN_INTENSITY, LN_INTENSITY_PRIOR, MirrorTerm, OWN, ReferenceShape, ShadedFrame,
-    Shading, ln_intensity, target_unknowns, thin,
+    LN_INTENSITY, LN_INTENSITY_PRIOR, MirrorTerm, ReferenceShape, ShadedFrame, Shading,
+    ln_intensity, target_unknowns, thin,
 };
 use crate::calibrate::solve::{Frames, Problem, Solved, solve};
 use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, values, with_values};
-use gonia_rig::{Remark, Rig};
+use gonia_rig::{Remark, Rig, Role};
 use nalgebra::DMatrix;
 
 /// Frames of the reference that a light needs.
@@ -33,9 +33,11 @@ const NOISES: f64 = 3.0;
 pub enum LightState {
     /// It was found.
     Found {
-        /// Frames of the reference that it stands on.
+        /// The surface whose shading shows it: the reference, or a material.
+        surface: Role,
+        /// Frames of it.
         frames: usize,
-        /// RMS of the reference's values about what the light makes of them, before and after, relative;
+        /// RMS of the surface's values about what the light makes of them, before and after, relative;
         /// the median frame's.
         shading: [f64; 2],
         /// Standard deviation of the lamp's intensity from frame to frame, relative.
@@ -48,22 +50,35 @@ pub enum LightState {
         /// Frames of the mirror.
         frames: usize,
     },
-    /// It stays as it was: too few frames of the reference show anything.
+    /// It stays as it was: too few frames of the reference, or without one of the material, show anything.
     NoReference {
         /// Those that do.
         frames: usize,
         /// How many are needed.
         needed: usize,
     },
-    /// It stays as it was: the reference does not scatter as the rig says, or without a reflectance as a
-    /// smooth, reciprocal surface does.
-    ReferenceUnlike {
+    /// It stays as it was: the reference does not scatter as the rig says, or without a reflectance (and a material)
+    /// as a smooth, reciprocal surface does.
+    Unlike {
+        /// The surface: the reference, or a material.
+        surface: Role,
         /// Standard deviation of a frame's level, relative.
         level: f64,
         /// Standard deviation of values within a frame, relative.
         within: f64,
     },
+    /// It stays as it was: the shading on a material of which nothing is known hardly tells where it is.
+    NotTold {
+        /// Frames of the material.
+        frames: usize,
+        /// The standard uncertainty that its directions would have, degrees: 95th percentile. `None` where no light
+        /// fits.
+        u_deg: Option<f64>,
+    },
 }
+
+/// A light whose directions a material leaves more uncertain than this share of what was thought possible stays.
+const TELLS: f64 = 0.25;
 
 /// What is known before the light is looked for.
 pub struct Known<'a> {
@@ -71,6 +86,8 @@ pub struct Known<'a> {
     pub camera: &'a DMatrix<f64>,
     /// What frames of a mirror say.
     pub mirror: Option<&'a MirrorLight<'a>>,
+    /// The surface whose shading is seen.
+    pub surface: Role,
 }
 
 impl Known<'_> {
@@ -111,8 +128,25 @@ pub struct Light {
 }
 
 impl Light {
-    /// Finds the light of a rig whose camera and target are known.
+    /// Finds the light of a rig whose camera and target are known. A material that leads nowhere leaves it as it was.
     pub fn find(
+        rig: &Rig,
+        frames: Vec<ShadedFrame>,
+        known: &Known<'_>,
+    ) -> Result<Self, CalibrateError> {
+        let count = frames.len();
+        match (Self::by_shading(rig, frames, known), known.surface) {
+            (Err(CalibrateError::NoSolution), Role::Material) => {
+                Ok(Self::left(LightState::NotTold {
+                    frames: count,
+                    u_deg: None,
+                }))
+            }
+            (found, _) => found,
+        }
+    }
+
+    fn by_shading(
         rig: &Rig,
         mut frames: Vec<ShadedFrame>,
         known: &Known<'_>,
@@ -124,11 +158,12 @@ impl Light {
             };
             return known.by_mirror_or(rig, state);
         }
-        let reference = ReferenceShape::of(rig);
+        let reference = ReferenceShape::of(rig, known.surface);
         thin(&mut frames, reference);
         let mut shading = Shading {
             rig,
             frames: &frames,
+            shape: reference,
             mirror: known.mirror.and_then(MirrorTerm::new),
         };
         let level = ln_intensity(rig, &frames);
@@ -136,7 +171,8 @@ impl Light {
         let prior = with_target(rig, reference);
         let typical = median(frames.iter().map(ShadedFrame::noise).collect());
         let everything = free(&[true; LIGHT.len()], prior.len());
-        let first = solve_light(&shading, &nominal, &prior, &everything, (Some(&OWN), None))?;
+        let [usual, ..] = reference.own();
+        let first = solve_light(&shading, &nominal, &prior, &everything, (Some(usual), None))?;
         // Residuals of shading are in units of a noise that is found with them.
         if let Some(mirror) = &mut shading.mirror {
             mirror.scale = first.noise;
@@ -148,7 +184,12 @@ impl Light {
             &everything,
             (None, Some(&first)),
         )?;
-        if let Some(unlike) = unlike(&all, typical) {
+        if let Some([level, within]) = unlike(&all, typical) {
+            let unlike = LightState::Unlike {
+                surface: known.surface,
+                level,
+                within,
+            };
             return known.by_mirror_or(rig, unlike);
         }
         let full = joined(known.camera, &all, &prior, &everything)?;
@@ -175,6 +216,7 @@ impl Light {
         let residuals = residuals_of(&shading, &before, &solved);
         let typical = |i: usize| median(residuals.iter().map(|r| r.share[i]).collect());
         let state = LightState::Found {
+            surface: known.surface,
             frames: frames.len(),
             shading: [typical(0), typical(1)],
             lamp: solved.own[2],
@@ -191,6 +233,22 @@ impl Light {
                 states,
             }),
         })
+    }
+
+    /// The light as it was where a material's frames tell hardly more of it: standard uncertainties (95th
+    /// percentile, degrees) of its directions as found, and as they were.
+    pub fn unless_told(self, found_deg: f64, was_deg: f64) -> Self {
+        match self.state {
+            LightState::Found {
+                surface: Role::Material,
+                frames,
+                ..
+            } if found_deg > TELLS * was_deg => Self::left(LightState::NotTold {
+                frames,
+                u_deg: Some(found_deg),
+            }),
+            _ => self,
+        }
     }
 
     fn left(state: LightState) -> Self {
@@ -250,11 +308,12 @@ fn residuals_of(shading: &Shading<'_>, before: &Solved, after: &Solved) -> Vec<S
     shading.frames.iter().map(of_frame).collect()
 }
 
-/// What a reference shows that does not scatter as it is thought to, where its values have a `typical` noise.
-pub fn unlike(solved: &Solved, typical: f64) -> Option<LightState> {
+/// What a surface shows that does not scatter as it is thought to, where its values have a `typical` noise: standard
+/// deviations of frames' levels and of values within a frame.
+pub fn unlike(solved: &Solved, typical: f64) -> Option<[f64; 2]> {
     let (level, within) = (solved.own[2], solved.noise * typical);
     let is_unlike = level > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical);
-    is_unlike.then_some(LightState::ReferenceUnlike { level, within })
+    is_unlike.then_some([level, within])
 }
 
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.
@@ -291,12 +350,14 @@ pub fn solve_light(
     free: &[bool],
     (own, start): (Option<&[f64]>, Option<&Solved>),
 ) -> Result<Solved, CalibrateError> {
+    let [usual, least_own, most_own] = shading.shape.own();
     let problem = Problem {
         nominal,
         prior,
         free,
-        own: own.unwrap_or(&OWN),
-        least_own: &LEAST_OWN,
+        own: own.unwrap_or(usual),
+        least_own,
+        most_own,
         least_noise: LEAST_FACTOR,
         finds_noise: own.is_none(),
     };

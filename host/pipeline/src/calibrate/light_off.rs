@@ -29,6 +29,7 @@ pub fn light_off(rig: &Rig, poses: &[Pose], mut frames: Vec<ShadedFrame>) -> Opt
     let shading = Shading {
         rig,
         frames: &frames,
+        shape: ReferenceShape::Known,
         mirror: None,
     };
     let nominal = nominal(rig, ln_intensity(rig, &frames), ReferenceShape::Known);

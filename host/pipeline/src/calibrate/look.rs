@@ -21,8 +21,10 @@ const MOST_AGAIN: f64 = 0.95;
 pub struct Seen {
     /// Lines of frames that show any.
     pub lines: Vec<LineFrame>,
-    /// Values of the reference.
+    /// Values of the reference; without any, and without a mirror, of the material.
     pub shaded: Vec<ShadedFrame>,
+    /// Which of the two.
+    pub shaded_role: Role,
     /// Frames of a mirror.
     pub mirrors: Vec<MirrorFrame>,
     /// The frames' checksum.
@@ -35,10 +37,11 @@ pub struct Seen {
 pub fn look_near(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, CalibrateError> {
     let registrar = Registrar::new(rig);
     let (sampler, grid) = (FrameSampler::new(rig), SamplingGrid::new(rig));
+    let shaded_role = shaded_role(rows);
     let looked = look.each(rows, |row, frame| {
         let points = registrar.line_points(frame, row.pose, Search::Near);
         let orientation = registrar.orientation(frame, row.pose.view);
-        let sampled = (row.role == Role::Reference && !points.is_empty())
+        let sampled = (row.role == shaded_role && !points.is_empty())
             .then(|| sampler.sample(frame, row, Hidden::Find))
             .filter(|sampled| sampled.report.outcome == Outcome::Locked);
         let shaded = sampled.and_then(|sampled| ShadedFrame::new(rig, &grid, &sampled));
@@ -58,7 +61,17 @@ pub fn look_near(rig: &Rig, rows: &[FrameRow], look: &Look<'_>) -> Result<Seen, 
             checksum: checksum::of_frame(frame),
         }
     })?;
-    gather(looked)
+    gather(looked, shaded_role)
+}
+
+/// Whose shading shows the light: the reference's where there is one. A mirror shows it better than a material of
+/// which nothing is known.
+fn shaded_role(rows: &[FrameRow]) -> Role {
+    let is_of_material = |row: &FrameRow| row.role == Role::Material;
+    match rows.iter().all(is_of_material) {
+        true => Role::Material,
+        false => Role::Reference,
+    }
 }
 
 /// Lines that lie beside a material are placed by the light that falls on both, and values of the reference by the
@@ -92,7 +105,7 @@ struct Shows {
     checksum: String,
 }
 
-fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
+fn gather(looked: Looked<Shows>, shaded_role: Role) -> Result<Seen, CalibrateError> {
     let (total, mut lost, mut first_error) = (looked.len(), 0, None);
     let (mut lines, mut shaded, mut sums) = (Vec::new(), Vec::new(), String::new());
     let (mut orientations, mut mirrors, mut dark_mirrors) = (Vec::new(), Vec::new(), 0);
@@ -140,6 +153,7 @@ fn gather(looked: Looked<Shows>) -> Result<Seen, CalibrateError> {
     Ok(Seen {
         lines,
         shaded,
+        shaded_role,
         mirrors,
         checksum: checksum::of_bytes(sums.as_bytes()),
         remarks,

@@ -282,6 +282,7 @@ impl Mirrors<'_> {
             free: &all_free(place),
             own: &[],
             least_own: &[],
+            most_own: &[],
             least_noise: 1e-6,
             finds_noise: false,
         };

@@ -5,7 +5,8 @@
 //! 3. With that, in all chosen frames to hundredths of a pixel. Camera, camera arm and target follow from
 //!    the lines of all frames together; values of the reference's grid points are read. Where their shading
 //!    shows a beam, the lines are found once more in its light.
-//! 4. The light and its arm follow from the shading on the reference. Lines say where the target is;
+//! 4. The light and its arm follow from the shading on the reference (without one, on a material together with a
+//!    smooth description of it). Lines say where the target is;
 //!    shading takes that from them, with its uncertainty, and does not change it: a reference that is not
 //!    quite what it is thought to be then spoils no camera.
 //!
@@ -51,7 +52,7 @@ use light::{Known, Light};
 use lines::misfit_px;
 use look::{Seen, look_again, look_near};
 use mirror::{MirrorFrame, MirrorLight};
-use numbers::{changes, direction_u};
+use numbers::{changes, direction_u, stated_poses};
 use record::{direction_u_of_light_as_it_was, record, table};
 use search::first_camera;
 use unknowns::{CAMERA, LIGHT, values, with_values};
@@ -78,7 +79,9 @@ pub struct Calibrated {
     pub light: LightState,
     /// What frames of a mirror say of it.
     pub mirror: Option<MirrorFit>,
-    /// By how much directions of light and view changed, degrees, over the frames.
+    /// Poses from straight above to the lowest of the frames, at the frames' azimuths: those of the next two.
+    pub poses: Vec<Pose>,
+    /// By how much directions of light and view changed, degrees.
     pub changes: [Spread; 2],
     /// Their standard uncertainties now, degrees; of a light that was left as it was, what was thought possible.
     pub direction_u: [Spread; 2],
@@ -141,8 +144,18 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     let known = Known {
         camera: &camera.covariance,
         mirror: mirror.as_ref(),
+        surface: seen.shaded_role,
     };
-    let light = Light::find(&with_camera, seen.shaded, &known)?;
+    let taken: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
+    let poses = stated_poses(&taken);
+    let u_as_it_was =
+        direction_u_of_light_as_it_was(rig, &camera.shared, &camera.covariance, &poses);
+    let mut light = Light::find(&with_camera, seen.shaded, &known)?;
+    if let Some(found) = light.solution() {
+        let numbers = [&camera.shared[..], &found.shared].concat();
+        let u = direction_u(rig, &[&CAMERA, &LIGHT], &numbers, &found.covariance, &poses);
+        light = light.unless_told(u[0].p95, u_as_it_was[0].p95);
+    }
     let mut remarks = seen.remarks;
     remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
     remarks.extend(light.remark());
@@ -150,7 +163,6 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     remarks.extend(few_shown(looked_at, shown));
     let found = light.rig(&with_camera);
 
-    let poses: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
     let mut numbers = table(
         &CAMERA,
         &values(&CAMERA, rig),
@@ -182,7 +194,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     }
     let direction_u = match light.solution() {
         Some(_) => direction_u(rig, &unknowns, &shared, &covariance, &poses),
-        None => direction_u_of_light_as_it_was(rig, &shared, &covariance, &poses),
+        None => u_as_it_was,
     };
     let median = |rig: &Rig| Spread::of(lines.iter().map(|f| misfit_px(rig, f)).collect()).p50;
     let calibration = record(&numbers, lines.len(), seen.checksum, shared, &covariance);
@@ -190,6 +202,7 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         frames: [looked_at, lines.len()],
         lines_px: [median(rig), median(&found)],
         changes: changes(rig, &found, &poses),
+        poses,
         direction_u,
         light: light.state(),
         mirror: mirror.as_ref().map(MirrorLight::fit),

@@ -10,6 +10,10 @@ use nalgebra::{DMatrix, DVector};
 const DETERMINED: f64 = 0.5;
 /// Step of numeric derivatives, in standard uncertainties.
 const STEP: f64 = 0.05;
+/// Steps of polar angle from straight above to the lowest of the frames, and azimuths at most, over which angles
+/// between directions are stated.
+const POLAR_STEPS: usize = 6;
+const AZIMUTHS: usize = 40;
 
 /// A number of the rig.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,6 +172,28 @@ impl Spread {
             max: at(1.0),
         }
     }
+}
+
+/// Poses over which angles between directions are stated: polar angles in even steps from straight above to the
+/// lowest of the frames, at the frames' azimuths. Over the frames themselves uncertainties would seem too small:
+/// most are low, and the fewest from above, where the light is known least.
+pub fn stated_poses(frames: &[Pose]) -> Vec<Pose> {
+    let lowest = |of: fn(&Pose) -> f64| frames.iter().map(of).fold(0.0, f64::max);
+    let [light, view] = [
+        lowest(|pose| pose.light.theta),
+        lowest(|pose| pose.view.theta),
+    ];
+    let every = frames.len().div_ceil(AZIMUTHS).max(1);
+    let at = |pose: &Pose, step: usize| {
+        let share = step as f64 / POLAR_STEPS as f64;
+        let mut pose = *pose;
+        (pose.light.theta, pose.view.theta) = (share * light, share * view);
+        pose
+    };
+    let azimuths = frames.iter().step_by(every);
+    azimuths
+        .flat_map(|pose| (0..=POLAR_STEPS).map(move |step| at(pose, step)))
+        .collect()
 }
 
 /// By how much directions of light and view differ between two rigs.

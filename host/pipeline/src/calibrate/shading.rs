@@ -6,9 +6,10 @@ use crate::calibrate::unknowns::{CAMERA, LIGHT, TARGET, Unknown, values, with_va
 use crate::process::SampledFrame;
 use crate::process::central::{n_terms, terms};
 use crate::process::reflectance::KnownReference;
+use gonia_brdf::direction::normalize;
 use gonia_brdf::{Direction, Elementary, Vec3};
 use gonia_imaging::{IdealLight, SamplingGrid};
-use gonia_rig::{CameraModel, Rig};
+use gonia_rig::{CameraModel, Rig, Role};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -16,19 +17,50 @@ use std::f64::consts::PI;
 /// logarithm of the lamp's intensity, and how far its points lie from where its lines put them (pixels: across the
 /// camera's line of sight and along it). At a grazing view a pixel is centimetres of the target: what moves the
 /// lines there by hundredths of a pixel would be taken for a light that stands elsewhere.
-pub const OWN: [f64; 5] = [0.03, 0.03, 0.01, 0.02, 0.02];
+const OWN: [f64; 5] = [0.03, 0.03, 0.01, 0.02, 0.02];
 
 /// The least that they are taken to be: no arm repeats better, no lamp, and no line is placed better.
-pub const LEAST_OWN: [f64; 5] = [0.005, 0.005, 1e-4, 0.002, 0.002];
+const LEAST_OWN: [f64; 5] = [0.005, 0.005, 1e-4, 0.002, 0.002];
+
+/// The same of an unknown material's frames, with what the polynomial leaves of its reflectance over a frame: slopes
+/// along x and y and three curvatures, as logarithms at the rim of the sampled disc. What it leaves is as smooth as
+/// the material, and the points of a frame share it: taken for noise of each, it would say far too much of the light.
+const OWN_OF_MATERIAL: [f64; 10] = [
+    0.03, 0.03, 0.01, 0.02, 0.02, 0.01, 0.01, 0.005, 0.005, 0.005,
+];
+const LEAST_OWN_OF_MATERIAL: [f64; 10] = [
+    0.005, 0.005, 1e-4, 0.002, 0.002, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4,
+];
+/// Arms and lines are no worse because a material is not as it is described.
+const MOST_OWN_OF_MATERIAL: [f64; 10] = [
+    0.03,
+    0.03,
+    f64::INFINITY,
+    0.02,
+    0.02,
+    f64::INFINITY,
+    f64::INFINITY,
+    f64::INFINITY,
+    f64::INFINITY,
+    f64::INFINITY,
+];
 
 /// The index of the logarithm of the lamp's intensity, behind the light's and the target's numbers.
 pub const LN_INTENSITY: usize = LIGHT.len() + TARGET;
 /// Its standard deviation: nothing is known of it.
 pub const LN_INTENSITY_PRIOR: f64 = 10.0;
-/// Degree of the polynomials (those of eq. (3)'s central field) that an unknown reference is described by,
-/// and the standard deviation of their coefficients.
+/// Degrees of the polynomials (those of eq. (3)'s central field) that an unknown reference and an unknown material
+/// are described by, and the standard deviation of their coefficients.
 const DEGREE: usize = 2;
+const DEGREE_OF_MATERIAL: usize = 3;
 const COEFFICIENT_PRIOR: f64 = 0.5;
+/// A material's points whose halfway vector is nearer to its normal than this cosine (25°) are of its highlight,
+/// which no such polynomial describes.
+const HIGHLIGHT_COSINE: f64 = 0.906;
+/// The standard deviation of a material's coefficients; and the cosine below which its light (or camera) is so low that
+/// it says more of the finish than of the light.
+const MATERIAL_PRIOR: f64 = 5.0;
+const GRAZING_COSINE: f64 = 0.17;
 /// Points at which the light is lower than this (cosine of its angle from the normal) tell of it no more
 /// than of themselves: a fibre's shadow is as long as a sample.
 const LOWEST_COSINE: f64 = 0.05;
@@ -36,6 +68,8 @@ const LOWEST_COSINE: f64 = 0.05;
 const MOST_POINTS: usize = 120_000;
 /// The same with an unknown reference, whose coefficients cost as much as all other numbers.
 const MOST_POINTS_UNKNOWN: usize = 40_000;
+/// The same with an unknown material.
+const MOST_POINTS_OF_MATERIAL: usize = 15_000;
 /// The logarithm of the least irradiance.
 const LN_DARK: f64 = -13.8;
 /// Points that show about where a light is.
@@ -61,6 +95,8 @@ struct ShadedPoint {
 pub struct ShadedFrame {
     /// The light arm's reading.
     pub light: Direction,
+    /// Degree of the polynomial that describes the surface; 0 of a known one.
+    degree: usize,
     points: Vec<ShadedPoint>,
     /// Relative noise of a value, from how neighbours differ.
     noise: f64,
@@ -75,6 +111,8 @@ pub struct Shading<'a> {
     pub rig: &'a Rig,
     /// At least one frame.
     pub frames: &'a [ShadedFrame],
+    /// What is known of the surface.
+    pub shape: ReferenceShape,
     /// What a mirror says of the light.
     pub mirror: Option<MirrorTerm>,
 }
@@ -117,7 +155,7 @@ impl MirrorTerm {
     }
 }
 
-/// What is known of the reference's reflectance.
+/// What is known of the reflectance of what frames show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceShape {
     /// All but a factor.
@@ -125,23 +163,48 @@ pub enum ReferenceShape {
     /// That it is smooth and reciprocal: the logarithm is a polynomial whose coefficients are shared numbers
     /// too, behind the intensity's.
     Smooth,
+    /// That away from its highlight it is a material that is: such a polynomial of a higher degree.
+    Material,
 }
 
 impl ReferenceShape {
-    /// Of a rig's reference.
-    pub fn of(rig: &Rig) -> Self {
-        match rig.reference {
-            Some(_) => Self::Known,
-            None => Self::Smooth,
+    /// Of the surface that frames of this role show.
+    pub fn of(rig: &Rig, role: Role) -> Self {
+        match (role, &rig.reference) {
+            (Role::Material, _) => Self::Material,
+            (_, Some(_)) => Self::Known,
+            (_, None) => Self::Smooth,
+        }
+    }
+
+    /// Standard deviations of a frame's own numbers to start from, the least that they are taken to be and the most.
+    pub fn own(self) -> [&'static [f64]; 3] {
+        match self {
+            Self::Known | Self::Smooth => [&OWN, &LEAST_OWN, &[f64::INFINITY; OWN.len()]],
+            Self::Material => [
+                &OWN_OF_MATERIAL,
+                &LEAST_OWN_OF_MATERIAL,
+                &MOST_OWN_OF_MATERIAL,
+            ],
+        }
+    }
+
+    /// Degree of the polynomial; 0 where there is none.
+    fn degree(self) -> usize {
+        match self {
+            Self::Known => 0,
+            Self::Smooth => DEGREE,
+            Self::Material => DEGREE_OF_MATERIAL,
         }
     }
 
     /// Prior standard deviations of the coefficients; the constant is the intensity's.
     pub fn priors(self) -> Vec<f64> {
-        match self {
-            Self::Known => Vec::new(),
-            Self::Smooth => vec![COEFFICIENT_PRIOR; n_terms(DEGREE) - 1],
-        }
+        let prior = match self {
+            Self::Known | Self::Smooth => COEFFICIENT_PRIOR,
+            Self::Material => MATERIAL_PRIOR,
+        };
+        vec![prior; n_terms(self.degree()) - 1]
     }
 }
 
@@ -163,18 +226,24 @@ pub struct ReferenceValue {
 }
 
 impl ShadedFrame {
-    /// Of a frame of the reference; `None` where hardly anything of it is lit.
+    /// Of a frame of the reference or of a material, by its role; `None` where hardly anything of it is lit.
     pub fn new(rig: &Rig, grid: &SamplingGrid, frame: &SampledFrame) -> Option<Self> {
         let light = IdealLight::new(rig, frame.reading.light);
+        let shape = ReferenceShape::of(rig, frame.report.role);
         let known = rig.reference.as_ref().map(KnownReference::new);
+        let known = known.filter(|_| shape == ReferenceShape::Known);
         let camera = frame.camera_at(&CameraModel::new(rig));
         let values = grid.points_mm().iter().zip(&frame.points).enumerate();
         let values = values.filter_map(|(i, (at, point))| {
             let point = point.as_ref().ok()?;
             let at_mm = [0, 1].map(|k| at[k] + f64::from(point.offset_mm[k]));
             let to_camera = camera.direction_from(at_mm);
+            let to_light = light.direction_from(at_mm);
+            if shape == ReferenceShape::Material && !is_smooth(to_light, to_camera) {
+                return None;
+            }
             let factor = match &known {
-                Some(known) => PI * sum(known.at(light.direction_from(at_mm), to_camera)),
+                Some(known) => PI * sum(known.at(to_light, to_camera)),
                 None => 1.0,
             };
             Some(ReferenceValue {
@@ -184,7 +253,11 @@ impl ShadedFrame {
                 radiance: sum(point.rgb) / factor,
             })
         });
-        Self::of_values(rig, frame.reading.light, values)
+        let shaded = Self::of_values(rig, frame.reading.light, values)?;
+        Some(Self {
+            degree: shape.degree(),
+            ..shaded
+        })
     }
 
     /// Of a frame's values, in the grid's order; `None` where hardly anything is lit.
@@ -214,6 +287,7 @@ impl ShadedFrame {
         }
         Some(Self {
             light: reading,
+            degree: 0,
             noise: noise_of(&row),
             pixel_mm: pixel_mm(rig, points[points.len() / 2].to_camera),
             points,
@@ -252,17 +326,59 @@ impl ShadedFrame {
         (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt()
     }
 
+    /// The light that shone on it, by a frame's own numbers.
+    fn light_at(&self, rig: &Rig, own: &[f64]) -> IdealLight {
+        let reading = Direction {
+            theta: self.light.theta + own[0].to_radians(),
+            phi: self.light.phi + own[1].to_radians(),
+        };
+        IdealLight::new(rig, reading)
+    }
+
+    /// Where a point is that seems to lie elsewhere by so many pixels.
+    fn shifted(&self, at_mm: [f64; 2], shift_px: [f64; 2]) -> [f64; 2] {
+        let [across, along] = self.pixel_mm;
+        [0, 1].map(|i| at_mm[i] + shift_px[0] * across[i] + shift_px[1] * along[i])
+    }
+
+    /// Derivatives of the residuals with respect to each coefficient; none of a known surface.
+    fn by_coefficient(&self, rig: &Rig, own: &[f64]) -> Vec<Vec<f64>> {
+        if self.degree == 0 {
+            return Vec::new();
+        }
+        let light = self.light_at(rig, own);
+        let mut row = Vec::new();
+        let mut columns = vec![Vec::with_capacity(self.points.len()); n_terms(self.degree) - 1];
+        for p in &self.points {
+            let at_mm = self.shifted(p.at_mm, [own[3], own[4]]);
+            terms(
+                self.degree,
+                light.direction_from(at_mm),
+                p.to_camera,
+                &mut row,
+            );
+            // The constant, 1, is the intensity's.
+            for (column, term) in columns.iter_mut().zip(&row[1..]) {
+                column.push(-term / self.noise);
+            }
+        }
+        columns
+    }
+
     /// ln radiance minus what light and reference make of it; `rest` are intensity and coefficients, `shift_px` how
     /// far the points lie from where they seem to.
     fn off(&self, light: &IdealLight, rest: &[f64], shift_px: [f64; 2]) -> Vec<f64> {
         let mut row = Vec::new();
-        let [across, along] = self.pixel_mm;
-        let shift_mm = [0, 1].map(|i| shift_px[0] * across[i] + shift_px[1] * along[i]);
         let of_point = |p: &ShadedPoint| {
-            let at_mm = [0, 1].map(|i| p.at_mm[i] + shift_mm[i]);
+            let at_mm = self.shifted(p.at_mm, shift_px);
             let mut off = p.ln - ln_irradiance(light, at_mm) - rest[0];
-            if rest.len() > 1 {
-                terms(DEGREE, light.direction_from(at_mm), p.to_camera, &mut row);
+            if self.degree > 0 {
+                terms(
+                    self.degree,
+                    light.direction_from(at_mm),
+                    p.to_camera,
+                    &mut row,
+                );
                 // The constant, 1, is the intensity's.
                 let field = row.iter().zip(rest).skip(1);
                 off -= field
@@ -273,6 +389,13 @@ impl ShadedFrame {
         };
         self.points.iter().map(of_point).collect()
     }
+}
+
+/// Whether most materials are smooth about these directions to light and camera: away from the highlight, neither
+/// grazing.
+fn is_smooth(to_light: Vec3, to_camera: Vec3) -> bool {
+    let halfway = normalize([0, 1, 2].map(|i| to_light[i] + to_camera[i]));
+    halfway[2] < HIGHLIGHT_COSINE && to_light[2].min(to_camera[2]) > GRAZING_COSINE
 }
 
 fn sum(rgb: [f32; 3]) -> f64 {
@@ -318,6 +441,7 @@ pub fn thin(frames: &mut [ShadedFrame], reference: ReferenceShape) {
     let most = match reference {
         ReferenceShape::Known => MOST_POINTS,
         ReferenceShape::Smooth => MOST_POINTS_UNKNOWN,
+        ReferenceShape::Material => MOST_POINTS_OF_MATERIAL,
     };
     thin_to(frames, most);
 }
@@ -375,14 +499,28 @@ impl Frames for Shading<'_> {
                 .flat_map(|mirror| mirror.residuals(rig))
                 .collect();
         };
-        let reading = Direction {
-            theta: frame.light.theta + own[0].to_radians(),
-            phi: frame.light.phi + own[1].to_radians(),
-        };
-        let light = IdealLight::new(rig, reading);
+        let light = frame.light_at(rig, own);
         let mut off = frame.off(&light, rest, [own[3], own[4]]);
-        off.iter_mut()
-            .for_each(|off| *off = (*off - own[2]) / frame.noise);
+        let uneven = own.get(5..).unwrap_or_default();
+        let rim_mm = self.rig.sampling.disc_radius_mm;
+        for (off, point) in off.iter_mut().zip(&frame.points) {
+            let [x, y] = point.at_mm.map(|c| c / rim_mm);
+            let shapes = [x, y, x * x, x * y, y * y];
+            let left: f64 = uneven
+                .iter()
+                .zip(shapes)
+                .map(|(own, shape)| own * shape)
+                .sum();
+            *off = (*off - own[2] - left) / frame.noise;
+        }
         off
+    }
+
+    /// The polynomial's coefficients.
+    fn by_last(&self, (rig, _): &Self::At, frame: usize, own: &[f64]) -> Vec<Vec<f64>> {
+        let Some(frame) = self.frames.get(frame) else {
+            return Vec::new();
+        };
+        frame.by_coefficient(rig, own)
     }
 }

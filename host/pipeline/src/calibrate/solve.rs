@@ -37,6 +37,12 @@ pub trait Frames: Sync {
     /// Residuals of a frame, in standard deviations of their noise up to a common factor; always as many.
     fn residuals(&self, at: &Self::At, frame: usize, own: &[f64]) -> Vec<f64>;
 
+    /// Derivatives of a frame's residuals with respect to the last of the shared numbers, a column for each, where the
+    /// residuals are linear in them; of the others they are found by differences.
+    fn by_last(&self, _at: &Self::At, _frame: usize, _own: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
     /// Whether a frame's residuals scatter as they are known to: then nothing is learnt from how far off it is.
     fn is_known(&self, _frame: usize) -> bool {
         false
@@ -55,6 +61,8 @@ pub struct Problem<'a> {
     pub own: &'a [f64],
     /// The least that they are taken to be: few frames seem to have none.
     pub least_own: &'a [f64],
+    /// The most that they are taken to be.
+    pub most_own: &'a [f64],
     /// The least that the residuals' common factor is taken to be.
     pub least_noise: f64,
     /// Whether noise and frames' own standard deviations are found too.
@@ -195,7 +203,8 @@ pub fn solve<F: Frames>(frames: &F, problem: &Problem, start: &[f64]) -> Option<
                 }
                 let variance = squares / told.max(f64::MIN_POSITIVE);
                 let ratio = (variance / (had[j] * had[j])).clamp(0.25, 4.0);
-                *sd = (ratio.sqrt() * had[j]).max(problem.least_own[j]);
+                let found = ratio.sqrt() * had[j];
+                *sd = found.min(problem.most_own[j]).max(problem.least_own[j]);
             }
         }
         let steady = own_sd
@@ -271,9 +280,13 @@ fn linearise<F: Frames>(
             let column =
                 |moved: Vec<f64>, step: f64| (DVector::from_vec(moved) - &residuals) / step;
             let mut by_shared = DMatrix::zeros(rows, n);
-            for (k, at) in beside.iter().enumerate() {
+            let last = frames.by_last(&here, f, &own[f]);
+            for (k, at) in beside.iter().enumerate().take(n - last.len()) {
                 let moved = frames.residuals(at, f, &own[f]);
                 by_shared.set_column(k, &column(moved, DERIVATIVE));
+            }
+            for (k, of_last) in (n - last.len()..n).zip(last) {
+                by_shared.set_column(k, &(problem.prior[k] * DVector::from_vec(of_last)));
             }
             let mut by_own = DMatrix::zeros(rows, own_sd.len());
             for (j, sd) in own_sd.iter().enumerate() {
@@ -390,6 +403,7 @@ mod tests {
                 free: &[true, true],
                 own: &[0.1],
                 least_own: &[1e-3],
+                most_own: &[f64::INFINITY],
                 least_noise: 1e-6,
                 finds_noise: true,
             };

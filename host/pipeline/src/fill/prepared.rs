@@ -31,6 +31,8 @@ pub(super) struct Prepared {
     /// … and the images that the bins hold.
     pub completed_by: Symmetry,
     pub origins: OriginCounts,
+    /// Cells into which samples fell themselves, where the bins hold their images too.
+    pub own: Option<Vec<u64>>,
     pub remarks: Vec<Remark>,
 }
 
@@ -77,12 +79,14 @@ impl Prepared {
             _ => Isotropy::Shown,
         };
         let images = symmetry.order();
-        let bins = if images > 1 {
-            Bins::new(grid, &symmetry.completed(samples.to_vec()))
+        let (bins, own) = if images > 1 {
+            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u64>>();
+            let completed = Bins::new(grid, &symmetry.completed(samples.to_vec()));
+            (completed, Some(own))
         } else {
-            bins
+            (bins, None)
         };
-        let origins = Origins::of(&bins, fit.as_ref()).counts();
+        let origins = Origins::of(&bins, own.as_deref(), fit.as_ref()).counts();
         remarks.extend(warnings::remark_on_layout(&samples, &origins, isotropy));
         Ok(Self {
             bins,
@@ -93,6 +97,7 @@ impl Prepared {
             symmetry: format!("{symmetry}, {reason}"),
             completed_by: symmetry,
             origins,
+            own,
             remarks,
         })
     }

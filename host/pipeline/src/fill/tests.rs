@@ -104,6 +104,7 @@ fn assert_parts_are_the_whole(of: impl Into<SampleValues>, options: &FillOptions
         path: Path::new("the fill"),
         errors: None,
         scale_by: None,
+        allow_coarse: false,
     };
     let zarr = export_format(&whole, None).unwrap();
     export(source, &whole, zarr, 0).unwrap();

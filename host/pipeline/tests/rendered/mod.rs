@@ -3,7 +3,7 @@
 use gonia_brdf::direction::angle_between;
 use gonia_brdf::model::{Kurt, KurtLobe};
 use gonia_brdf::random::Random;
-use gonia_brdf::{Direction, Pose, Vec3};
+use gonia_brdf::{Brdf, Direction, Pose, Vec3};
 use gonia_formats::FileError;
 use gonia_pipeline::process::FrameSource;
 use gonia_rig::{CameraModel, CameraShift, Frame, FrameRow, Reference, Rig, Role};
@@ -44,6 +44,17 @@ impl Rendered {
     }
 
     pub fn scattered(truth: &Rig, rows: Vec<FrameRow>, scatter: &Scatter) -> Self {
+        let fabric = Arc::new(Kurt::two_thread_fabric());
+        Self::of_material(truth, rows, scatter, fabric)
+    }
+
+    /// Frames of role material show this one.
+    pub fn of_material(
+        truth: &Rig,
+        rows: Vec<FrameRow>,
+        scatter: &Scatter,
+        material: Arc<dyn Brdf>,
+    ) -> Self {
         let gloss = KurtLobe {
             specular: [scatter.gloss; 3],
             f0: 0.05,
@@ -54,7 +65,7 @@ impl Rendered {
         };
         let mut scene = Scene::new(
             SceneGeometry::of_rig(truth),
-            Arc::new(Kurt::two_thread_fabric()),
+            material,
             Arc::new(Kurt::new([0.9; 3], &[gloss])),
             scatter.seed,
         );
