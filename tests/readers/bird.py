@@ -12,7 +12,7 @@ import tempfile
 import jsonschema
 import numpy as np
 
-from lopsided import check, brdf, direction, export, table
+from lopsided import brdf, check, direction, export, pairs, table
 
 TEXT = {"type": "string"}
 ADDRESS = ["country", "city", "street", "building_nr", "postal_code"]
@@ -101,7 +101,27 @@ def main():
     share = column("uBRDF") / column("BRDF")
     print(f"bird: {share.size} values, uBRDF/BRDF {share.min():.4f} to {share.max():.4f}")
     good &= abs(share - 0.03).max() < 1e-5
+    good &= samples(gonia)
     sys.exit(0 if good else 1)
+
+
+def samples(gonia):
+    """Whether samples are what the schema says, each with the scatter of the five of its direction."""
+    light, view = (np.repeat(d, 5, axis=1) for d in pairs(400))
+    f = brdf(light, view) * np.exp(0.015 * np.random.default_rng(2).normal(size=2000))
+    degrees = lambda d: (np.degrees(np.arccos(d[2])), np.degrees(np.arctan2(d[1], d[0])) % 360)
+    columns = [*degrees(light), *degrees(view), f, 2 * f, 3 * f]
+    with tempfile.TemporaryDirectory() as folder:
+        heading = "theta_i,phi_i,theta_v,phi_v,r,g,b"
+        np.savetxt(folder + "/a.csv", np.stack(columns, -1), fmt="%.7g", delimiter=",", header=heading, comments="")
+        export(gonia, folder + "/a.csv", folder + "/a.json")
+        text = json.load(open(folder + "/a.json"))
+    jsonschema.validate(text, SCHEMA, format_checker=jsonschema.FormatChecker())
+    values, u = (np.array(text["data"][name]["values"]).reshape(-1, 3) for name in ("BRDF", "uBRDF"))
+    off = abs(values / np.stack(columns[4:], -1) - 1).max()
+    share = u / values
+    print(f"bird, samples: values within {off:.1e}, uBRDF/BRDF {share.min():.4f} to {share.max():.4f} (noise 0.0150)")
+    return off < 1e-5 and share.min() > 0.0135 and share.max() < 0.0165
 
 
 if __name__ == "__main__":

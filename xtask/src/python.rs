@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What builds and tests it, at the versions that it was tried with.
-const PACKAGES: [&str; 8] = [
+const PACKAGES: [&str; 10] = [
     "maturin==1.16.0",
     "pytest==9.2.0",
     "numpy==2.4.6",
@@ -15,6 +15,8 @@ const PACKAGES: [&str; 8] = [
     "dask==2026.8.0",
     "distributed==2026.8.0",
     "dask-jobqueue==0.9.0",
+    "nbclient==0.11.0",
+    "ipykernel==7.4.0",
 ];
 
 /// Builds the package in the profile of the tests, and runs its tests beside the command's.

@@ -2,10 +2,11 @@
 //! ln(f/f_true) over cells that are neither a bin nor a bin's mirror.
 //!
 //! `cargo bench -p gonia-brdf --bench fill -- [MATERIAL …] [PRESET] [--step 2] [--block 8]
-//! [--neighbours 128] [--tolerance 1] [--budget 4] [--exponent 0.1] [--kernel 0.3] [--noise 0.015]
-//! [tenth|quick]`
+//! [--neighbours 128] [--tolerance 1] [--target-error 0.002] [--budget 4] [--exponent 0.1] [--kernel 0.3] [--noise 0.015]
+//! [tenth|quick|--poses 2000|--even 2000] [--plane 23]`
 //!
-//! The poses are the paper's 8505, every tenth of them, or the 925 of the quick demo.
+//! The poses are the paper's 8505, every tenth of them, about so many of them, about so many in even rings, or the 925 of the quick demo. With
+//! `--plane` the samples have their images by a half-turn and by a plane of that azimuth, degrees, too.
 //! Without `--exponent` the coordinates are chosen; with it, these are taken.
 //!
 //! It prints a table, with the details of each row above it. CPU-s: sorting, choosing and filling.
@@ -23,7 +24,7 @@ use gonia_brdf::interpolate::{
     Calibration, Data, FillSettings, Preset, fill, fill_with_errors, select,
 };
 use gonia_brdf::progress::silent;
-use gonia_brdf::{Bins, Brdf, Grid};
+use gonia_brdf::{Bins, Brdf, Grid, MirrorPlane, Symmetry};
 use plan::{Poses, cpu_seconds, material, measure_with};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -51,6 +52,7 @@ impl Arguments {
         FillSettings {
             block_deg: self.number("--block", preset.block_deg),
             tolerance: self.number("--tolerance", preset.tolerance.into()) as f32,
+            target_error: self.number("--target-error", preset.target_error.into()) as f32,
             budget: self.number("--budget", preset.budget.into()) as f32,
             neighbours: self.number("--neighbours", preset.neighbours as f64) as usize,
             range: self.number("--range", preset.range.into()) as f32,
@@ -84,12 +86,25 @@ fn run(name: &str, arguments: &Arguments) {
         (_, true) => (Poses::quick(), "925"),
         _ => (Poses::paper(), "8505"),
     };
+    let (poses, how_many) = match arguments.number("--poses", 0.0) as usize {
+        0 => (poses, how_many.to_owned()),
+        count => (Poses::few(count), format!("about {count}")),
+    };
+    let (poses, how_many) = match arguments.number("--even", 0.0) as usize {
+        0 => (poses, how_many),
+        count => (Poses::even(count), format!("{count}, even")),
+    };
     let model = material(name);
     let samples = measure_with(&*model, arguments.number("--noise", plan::NOISE), &poses);
+    let count = samples.len();
+    let plane = arguments.number("--plane", f64::NAN);
+    let samples = match plane.is_nan() {
+        true => samples,
+        false => Symmetry::HalfTurnBilateral(MirrorPlane::at_deg(plane)).completed(samples),
+    };
     let start = Instant::now();
     let bins = Bins::new(grid, &samples);
     let bin_s = start.elapsed().as_secs_f64();
-    let count = samples.len();
     drop(samples);
     let base = arguments.settings();
     let cpu = cpu_seconds();

@@ -3,7 +3,8 @@
 //! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
 //! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
 //! `cargo xtask figures fill-fine` measures that. `-- --few` prints the table of few samples alone, at random pairs of
-//! directions: time of a grid of 2°, and error and coverage of the fit at others.
+//! directions: time of a grid of 2°, and error and coverage of the fit at others; a material or a number of samples after
+//! it leaves the other rows out.
 
 #![allow(clippy::expect_used)]
 
@@ -13,7 +14,7 @@ use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
 use gonia_brdf::progress::silent;
 use gonia_brdf::random::Random;
 use gonia_brdf::scattered::{FEW_ANISOTROPIC, ScatteredFit};
-use gonia_brdf::{Bins, Brdf, Direction, Elementary, Grid, Sample};
+use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Elementary, Grid, Sample};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
 use std::time::Instant;
@@ -38,7 +39,7 @@ fn main() {
         return measure_row(number(1) as usize, number(2));
     }
     if arguments.iter().any(|a| a == "--few") {
-        return few_samples();
+        return few_samples(&arguments);
     }
     println!(
         "| samples | bins | step | threads | binning, CPU-s | sorting and choosing, CPU-s | fill, CPU-s | all, CPU-s | wall, s | peak, MB |"
@@ -111,14 +112,24 @@ const NOISE: f64 = 0.01;
 /// At so many pairs the fit is compared with the truth.
 const ASKED: usize = 2000;
 
-fn few_samples() {
+/// The rows of all materials and numbers of samples, or of those among the arguments.
+fn few_samples(only: &[String]) {
     println!(
-        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | within 95 % bars |"
+        "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | at nodes | within 95 % bars | at nodes |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
-    for name in ["satin-paint", "fabric"] {
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    let names = ["satin-paint", "fabric"];
+    let is_one = |word: &String| names.contains(&word.as_str());
+    let is_count = |word: &String| word.parse::<usize>().is_ok();
+    let wanted = |word: &str, is_such: &dyn Fn(&String) -> bool| {
+        !only.iter().any(is_such) || only.iter().any(|a| a == word)
+    };
+    for name in names.into_iter().filter(|name| wanted(name, &is_one)) {
         let material = material(name);
-        for samples in FEW {
+        for samples in FEW
+            .into_iter()
+            .filter(|n| wanted(&n.to_string(), &is_count))
+        {
             few_row(name, &*material, samples);
         }
     }
@@ -152,18 +163,24 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     let choosing = lap();
     let symmetry = fit.choice().settings.symmetry;
     let by_blocks = fit.places() > FEW_ANISOTROPIC && !symmetry.is_isotropic();
+    let mut at_nodes = (f64::NAN, f64::NAN);
     let times = [false, true].map(|with_errors| {
         if by_blocks && with_errors {
             return "by blocks".to_owned();
-        } else if by_blocks {
+        }
+        let dense = if by_blocks {
             let bins = Bins::new(grid, &symmetry.completed(samples.clone()));
             let data = Data::new(&bins);
             let settings = select(&data, FillSettings::DEFAULT).settings;
-            drop(fill(&data, &settings, &silent).expect("enough bins"));
+            let dense = fill(&data, &settings, &silent).expect("enough bins");
+            (dense, None)
         } else {
-            drop(fit.dense(grid, with_errors));
-        }
-        format!("{:.1}", lap())
+            fit.dense(grid, with_errors)
+        };
+        let time = format!("{:.1}", lap());
+        at_nodes = against_truth(&dense, &truth, &asked);
+        lap();
+        time
     });
     let (mut squares, mut within) = (0.0, 0.0);
     for ((value, error), (l, v)) in fit.at_all(&asked).iter().zip(&asked) {
@@ -175,9 +192,42 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     }
     let all = 3.0 * ASKED as f64;
     println!(
-        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.1} % |",
+        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.4} | {:.1} % | {} |",
         times.join(" | "),
         (squares / all).sqrt(),
+        at_nodes.0,
         100.0 * within / all,
+        match at_nodes.1.is_nan() {
+            true => "–".to_owned(),
+            false => format!("{:.1} %", at_nodes.1),
+        },
     );
+}
+
+/// A dense BRDF with its errors at the nodes nearest to pairs of directions: RMS of logarithms over the truth, and the
+/// share within 95 % bars, percent.
+fn against_truth(
+    (dense, errors): &(DenseBrdf, Option<[Vec<f32>; 3]>),
+    truth: &impl Fn(Direction, Direction) -> [f64; 3],
+    pairs: &[(Direction, Direction)],
+) -> (f64, f64) {
+    let grid = dense.grid();
+    let (mut squares, mut within) = (0.0, 0.0);
+    for (light, view) in pairs {
+        let nearest = |d: &Direction| grid.nearest(d.theta_deg(), d.phi_deg());
+        let [l, v] = [light, view].map(|d| nearest(d).expect("within the grid"));
+        let truth = truth(grid.direction(l), grid.direction(v));
+        for (c, (found, truth)) in dense.at(l, v).into_iter().zip(truth).enumerate() {
+            let found = f64::from(found);
+            squares += (found / truth).natural_log().powi(2);
+            let error = |e: &[Vec<f32>; 3]| f64::from(e[c][grid.cell(l, v)]);
+            let error = errors.as_ref().map_or(f64::NAN, error);
+            within += match error.is_nan() {
+                true => f64::NAN,
+                false => f64::from(u8::from((found - truth).abs() <= 1.96 * error)),
+            };
+        }
+    }
+    let all = 3.0 * pairs.len() as f64;
+    ((squares / all).sqrt(), 100.0 * within / all)
 }

@@ -5,9 +5,13 @@
 //! dense EXR has one row a light direction and one column a view direction.
 
 use crate::direction::{Direction, wrap_deg};
+use std::ops::RangeInclusive;
 
 /// Largest polar angle of a node, in degrees (the paper's 86°).
 pub const THETA_MAX_DEG: f64 = 86.0;
+
+/// Steps that a grid may have, thousandths of a degree.
+const STEPS_MDEG: RangeInclusive<u32> = 500..=30_000;
 
 /// A lattice of directions with the same step in θ and φ, used for light and view alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +24,7 @@ pub struct Grid {
 /// Why a grid cannot be made.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
-    "a grid step of {step_mdeg} millidegrees does not divide 180 degrees, or is not in 1..=30 degrees"
+    "a grid step of {step_mdeg} millidegrees does not divide 180 degrees, or is not in 0.5..=30 degrees"
 )]
 pub struct GridError {
     step_mdeg: u32,
@@ -34,10 +38,10 @@ impl Grid {
         n_phi: 180,
     };
 
-    /// A grid of the given step in degrees. The step must divide 180° and lie in 1° ..= 30°.
+    /// A grid of the given step in degrees. The step must divide 180° and lie in 0.5° ..= 30°.
     pub fn with_step_deg(step_deg: f64) -> Result<Self, GridError> {
         let step_mdeg = (step_deg * 1000.0).round().clamp(0.0, 4e9) as u32;
-        if !(1000..=30_000).contains(&step_mdeg) || 180_000 % step_mdeg != 0 {
+        if !STEPS_MDEG.contains(&step_mdeg) || 180_000 % step_mdeg != 0 {
             return Err(GridError { step_mdeg });
         }
         Ok(Self {
@@ -49,7 +53,7 @@ impl Grid {
 
     /// The grid whose square EXR has this many rows, if there is one.
     pub fn from_directions(n_directions: usize) -> Option<Self> {
-        (1000..=30_000)
+        STEPS_MDEG
             .filter_map(|mdeg| Self::with_step_deg(f64::from(mdeg) / 1000.0).ok())
             .find(|grid| grid.n_directions() == n_directions)
     }
@@ -186,7 +190,7 @@ mod tests {
 
     #[test]
     fn steps_that_do_not_close_the_circle_are_refused() {
-        for bad in [0.0, -2.0, 0.5, 7.0, 45.0, f64::NAN] {
+        for bad in [0.0, -2.0, 0.4, 7.0, 45.0, f64::NAN] {
             assert!(Grid::with_step_deg(bad).is_err(), "{bad}");
         }
     }

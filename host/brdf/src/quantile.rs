@@ -41,6 +41,21 @@ pub fn quantile(values: &mut [f32], share: f32) -> Option<f32> {
     Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
+/// The value below which values of a share of all weight lie, 0 ..= 1. The pairs of value and weight are sorted; `None`
+/// of no weight.
+pub fn weighted_quantile(values: &mut [(f32, f32)], share: f32) -> Option<f32> {
+    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f32 = values.iter().map(|(_, weight)| weight).sum();
+    let mut below = 0.0;
+    let reaches = |(_, weight): &&(f32, f32)| {
+        below += weight;
+        below > share * all
+    };
+    let at = values.iter().find(reaches);
+    let value = at.or(values.last()).map(|(value, _)| *value);
+    value.filter(|_| all > 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,5 +82,17 @@ mod tests {
         assert_eq!(quantile(&mut values, 1.0), Some(99.0));
         assert_eq!(quantile(&mut values, 0.0), Some(0.0));
         assert_eq!(quantile(&mut [], 0.5), None);
+    }
+
+    #[test]
+    fn a_weight_counts_as_so_many_values() {
+        let mut weighted = [(3.0, 1.0), (1.0, 5.0), (2.0, 4.0)];
+        let mut all = [1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0];
+        for share in [0.0, 0.3, 0.55, 0.85, 0.95, 1.0] {
+            let expected = quantile(&mut all, share);
+            assert_eq!(weighted_quantile(&mut weighted, share), expected, "{share}");
+        }
+        assert_eq!(weighted_quantile(&mut [], 0.5), None);
+        assert_eq!(weighted_quantile(&mut [(1.0, 0.0)], 0.5), None);
     }
 }

@@ -90,9 +90,14 @@ fn main() {
         .iter()
         .position(|a| a == "--out")
         .map_or(".", |k| arguments[k + 1].as_str());
-    println!("| material | poses of | filled with | poses | CPU-s | interior | grazing |");
-    println!("|---|---|---|---|---|---|---|");
-    let cases = cases();
+    println!(
+        "| material | poses of | filled with | poses | CPU-s | interior | grazing | symmetry |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let mut cases = Vec::from(cases());
+    let is_case = |name: &String| cases.iter().any(|case| case.name == name);
+    let only: Vec<String> = arguments.iter().filter(|a| is_case(a)).cloned().collect();
+    cases.retain(|case| only.is_empty() || only.iter().any(|name| name == case.name));
     let mut lines = Vec::new();
     for case in &cases {
         let spared = format!("--symmetry {}", case.symmetry.name());
@@ -139,10 +144,14 @@ fn row(case: &Case, poses: &[Pose], symmetry: SymmetryKind) -> (f64, String) {
     let start = ProcessTime::now();
     let filled = fill(samples, Scale::Absolute, &options, &silent).expect("enough samples");
     let cpu_s = start.elapsed().as_secs_f64();
+    let found = filled.account.symmetry.clone();
     let dense = filled.into_rgb().expect("colours").brdf;
     let figures = compared(&dense, &*case.brdf);
     let rms = |s| figures.stratum(s).map_or(f64::NAN, |f| f.log_rms);
     let interior = rms(Stratum::Interior);
-    let row = format!("{cpu_s:.1} | {interior:.4} | {:.4}", rms(Stratum::Grazing));
+    let row = format!(
+        "{cpu_s:.1} | {interior:.4} | {:.4} | {found}",
+        rms(Stratum::Grazing)
+    );
     (interior, row)
 }

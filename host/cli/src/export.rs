@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use crate::remarks;
+use crate::sample_facts::is_samples;
 use crate::say::outln;
 use crate::table::{self, bytes, count};
 use anyhow::{Result, bail};
@@ -9,19 +10,21 @@ use gonia_formats::check_output;
 use gonia_formats::checksum::of_channels;
 use gonia_formats::dense::{ERRORS_OF, read_dense_channels};
 use gonia_formats::export::{ExportFormat, check_new_folder, export_format, export_table};
+use gonia_formats::samples::read_channels;
 use gonia_pipeline::export::{ExportError, ExportSource, Places, export};
-use gonia_rig::DenseChannels;
+use gonia_pipeline::export_samples::{SamplesExport, export_samples};
+use gonia_rig::{DenseChannels, Scale};
 use std::path::{Path, PathBuf};
 
-/// Writes a dense BRDF in the format of another program, and says how far that file is from it.
+/// Writes a dense BRDF in the format of another program, and says how far that file is from it; or samples in BiRD's.
 #[derive(clap::Args)]
 #[command(
-    after_long_help = "Example:\n  gonia export dense.exr -o fabric.bsdf                      for Mitsuba's 'measured'\n  gonia export dense.exr -o fabric.xml --format tensortree4  for Radiance\n  gonia export --list-formats                                what there is\n\nThe file is read back and compared with the table: median, 99th percentile and RMS of |ln| of their ratio, at\nrandom directions, or at the file's own where its readers agree on nothing else. Most formats mean 1/sr; of a\nrelative BRDF say by what factor it becomes so."
+    after_long_help = "Example:\n  gonia export dense.exr -o fabric.bsdf                      for Mitsuba's 'measured'\n  gonia export dense.exr -o fabric.xml --format tensortree4  for Radiance\n  gonia export --list-formats                                what there is\n  gonia export samples.npy -o fabric.json --dense dense.exr  samples with uncertainties, as BiRD's JSON\n\nThe file is read back and compared with the table: median, 99th percentile and RMS of |ln| of their ratio, at\nrandom directions, or at the file's own where its readers agree on nothing else. Most formats mean 1/sr; of a\nrelative BRDF say by what factor it becomes so."
 )]
 pub struct Export {
-    /// The dense BRDF
-    #[arg(required_unless_present = "list_formats")]
-    dense: Option<PathBuf>,
+    /// The dense BRDF, or samples
+    #[arg(required_unless_present = "list_formats", value_name = "DENSE")]
+    source: Option<PathBuf>,
     /// The file to write
     #[arg(
         short,
@@ -39,18 +42,27 @@ pub struct Export {
     /// Take a relative BRDF for 1/sr after multiplying it by this factor
     #[arg(long, value_name = "FACTOR")]
     assume_scale: Option<f64>,
+    /// Export a grid that is too coarse for the format, with a warning
+    #[arg(long)]
+    allow_coarse: bool,
     /// Error bars, as gonia fill --error wrote them, for formats that hold them
     #[arg(long, value_name = "ERR.exr")]
     error: Option<PathBuf>,
+    /// Of samples: the dense BRDF that was filled from them, whose slopes say what the uncertainty of directions comes to
+    #[arg(long, value_name = "DENSE.exr")]
+    dense: Option<PathBuf>,
     /// Print the formats, a row each, and end
     #[arg(long)]
     list_formats: bool,
 }
 
+/// The format that holds samples.
+const BIRD: &str = "bird";
+
 impl Export {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let (false, Some(dense), Some(output)) = (self.list_formats, &self.dense, &self.output)
+        let (false, Some(dense), Some(output)) = (self.list_formats, &self.source, &self.output)
         else {
             for row in export_table() {
                 outln!("{}", row.join("\t").replace('`', ""));
@@ -58,12 +70,22 @@ impl Export {
             return Ok(());
         };
         let format = export_format(output, self.format.as_deref())?;
-        let resolution = self.resolution(format)?;
         if let Some(factor) = self.assume_scale
             && !(factor > 0.0 && factor.is_finite())
         {
             bail!("--assume-scale {factor}: give a factor above 0");
         }
+        if is_samples(dense) {
+            return self.samples(dense, output, format);
+        }
+        if let Some(of_samples) = &self.dense {
+            bail!(
+                "--dense {}: goes with samples, and {} is a dense BRDF; leave it out",
+                of_samples.display(),
+                dense.display()
+            );
+        }
+        let resolution = self.resolution(format)?;
         if format.is_folder {
             check_new_folder(output)?;
         } else {
@@ -106,6 +128,66 @@ impl Export {
         Ok(())
     }
 
+    /// Samples, which one format holds.
+    fn samples(&self, of: &Path, output: &Path, format: &ExportFormat) -> Result<()> {
+        if format.name != BIRD {
+            bail!(
+                "{}: {} does not hold samples; name it .json (BiRD), or export the dense BRDF that is filled from them (gonia fill)",
+                output.display(),
+                format.title
+            );
+        }
+        let dense_only = [
+            ("--error", self.error.is_some()),
+            ("--resolution", self.resolution.is_some()),
+            ("--allow-coarse", self.allow_coarse),
+        ];
+        if let Some((option, _)) = dense_only.iter().find(|(_, is_given)| *is_given) {
+            bail!(
+                "{option}: goes with a dense BRDF, and {} are samples; leave it out",
+                of.display()
+            );
+        }
+        let inputs: Vec<&Path> = [Some(of), self.dense.as_deref()]
+            .into_iter()
+            .flatten()
+            .collect();
+        check_output(output, &inputs)?;
+        let progress = Progress::new();
+        let (read, dense) = progress.stage("reading", |_| {
+            let dense = self.dense.as_deref().map(read_dense_channels).transpose()?;
+            Ok::<_, gonia_formats::FileError>((read_channels(of)?, dense))
+        })?;
+        remarks::print(&read.remarks);
+        let count_of_samples = read.values.len();
+        let source = SamplesExport {
+            samples: read.values,
+            scale: read.scale.unwrap_or(Scale::Relative),
+            provenance: read.provenance,
+            path: of,
+            dense: dense.as_ref(),
+            scale_by: self.assume_scale,
+        };
+        let exported = progress.stage("writing", |_| export_samples(source, output))?;
+        remarks::print(&exported.remarks);
+        let u = if exported.with_uncertainties {
+            "the combined standard uncertainty of each value (k = 1)"
+        } else {
+            "none: nothing is known of them"
+        };
+        table::print(&[
+            ("format".into(), format.title.to_owned()),
+            ("samples".into(), count(count_of_samples as u64)),
+            ("values".into(), count(exported.values as u64)),
+            ("uncertainties".into(), u.into()),
+            (
+                "written".into(),
+                format!("{}, {}", output.display(), bytes(size_of(output))),
+            ),
+        ]);
+        Ok(())
+    }
+
     fn source<'a>(&self, path: &'a Path) -> Result<ExportSource<'a>> {
         let dense = read_dense_channels(path)?;
         let errors = self.error.as_deref().map(|errors| {
@@ -124,6 +206,7 @@ impl Export {
             dense,
             path,
             scale_by: self.assume_scale,
+            allow_coarse: self.allow_coarse,
         })
     }
 

@@ -54,6 +54,10 @@ pub struct Fill {
     /// noise; 0 refines all, inf none [default: the preset's, or more where refining would cost too much]
     #[arg(long, value_name = "T")]
     tolerance: Option<f32>,
+    /// Refine no block for a smaller relative difference than this, percent, however little noise samples have: what
+    /// the use of the BRDF needs [default: 0.2; 0 with --tolerance]
+    #[arg(long, value_name = "PERCENT")]
+    target_error: Option<f32>,
     /// The material's symmetry about its normal: auto (what few samples show, or leave to be assumed),
     /// none, isotropic, bilateral, half-turn or half-turn-bilateral
     #[arg(long, value_enum, default_value = "auto")]
@@ -106,6 +110,7 @@ impl Fill {
             block_deg: self.block,
             nodes: self.nodes,
             tolerance: self.tolerance,
+            target_error: self.target_error.map(|percent| percent / 100.0),
             with_errors: self.error.is_some(),
             symmetry: self.symmetry.into(),
             plane_deg: self.plane,
@@ -293,19 +298,24 @@ fn uncertainty_rows(
 }
 
 /// Where the cells' values come from.
-fn origins(counts: &OriginCounts) -> [(String, String); 4] {
+fn origins(counts: &OriginCounts) -> Vec<(String, String)> {
     let guessed = 100.0 * counts.extrapolated_share();
     let extrapolated = table::count(counts.extrapolated);
-    [
+    let symmetric =
+        (counts.symmetric > 0).then(|| ("cells by symmetry", table::count(counts.symmetric)));
+    let known = [
         ("cells measured", table::count(counts.measured)),
         ("cells by reciprocity", table::count(counts.reciprocal)),
+    ];
+    let others = [
         ("cells interpolated", table::count(counts.interpolated)),
         (
             "cells extrapolated",
             format!("{extrapolated} ({guessed:.1} %)"),
         ),
-    ]
-    .map(|(name, text)| (name.to_owned(), text))
+    ];
+    let all = known.into_iter().chain(symmetric).chain(others);
+    all.map(|(name, text)| (name.to_owned(), text)).collect()
 }
 
 /// The share of the light that is reflected: of colours in green at three polar angles, and the highest of all.

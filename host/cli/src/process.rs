@@ -4,8 +4,9 @@ use crate::progress::Progress;
 use crate::{account, remarks, sample_facts, table};
 use anyhow::{Result, bail};
 use gonia_acquire::session::{RIG, SessionFolder};
-use gonia_formats::samples::{check_sample_name, write_noted_samples};
+use gonia_formats::samples::{check_sample_name, write_noted_samples_with_u};
 use gonia_formats::{CaptureFolder, check_output};
+use gonia_pipeline::budget::{budget_of, scale_uncertainty};
 use gonia_pipeline::process::{MASKS, Masks};
 use gonia_pipeline::samples_of;
 use gonia_rig::{remark_on_certificate, rig_remarks};
@@ -66,7 +67,10 @@ impl Process {
         remarks::print(remark_on_certificate(place.display(), &rig, &today).as_slice());
         remarks::print(&processed.remarks);
         progress.stage("writing samples", |_| {
-            write_noted_samples(&output, &processed.samples, &processed.note(&rig, facts))
+            let samples = &processed.samples;
+            let budget = budget_of(&rig, processed.calibration, samples);
+            let u = scale_uncertainty(&budget, samples);
+            write_noted_samples_with_u(&output, samples, &u, &processed.note(&rig, facts))
         })?;
         if !processed.masks.is_empty() {
             processed.masks.write(&output.with_file_name(MASKS), &rig)?;

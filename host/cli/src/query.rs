@@ -1,5 +1,6 @@
 //! `gonia query`: values at any directions.
 
+use crate::sample_facts::is_samples;
 use crate::say::errln;
 use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
@@ -42,15 +43,10 @@ pub struct Query {
     error: Option<PathBuf>,
 }
 
-/// Endings of samples; what else there is, is a dense BRDF.
-const SAMPLES: [&str; 5] = ["npy", "npz", "csv", "txt", "tsv"];
-
 impl Query {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let ending = self.dense.extension().and_then(|e| e.to_str());
-        let is_samples = ending.is_some_and(|e| SAMPLES.iter().any(|s| e.eq_ignore_ascii_case(s)));
-        if is_samples {
+        if is_samples(&self.dense) {
             self.ask_samples()
         } else {
             self.ask_dense()

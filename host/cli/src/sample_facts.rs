@@ -5,6 +5,15 @@ use gonia_formats::{FileError, checksum};
 use gonia_pipeline::provenance::Provenance;
 use std::path::Path;
 
+/// Endings of samples; what else there is, is a dense BRDF.
+const SAMPLES: [&str; 5] = ["npy", "npz", "csv", "txt", "tsv"];
+
+/// Whether a name is one of samples.
+pub fn is_samples(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.is_some_and(|ending| SAMPLES.iter().any(|of| ending.eq_ignore_ascii_case(of)))
+}
+
 /// Of a session: its beginning, its rig and plan by their checksums, its camera and controllers.
 pub fn of_session(made_by: &str, session: &SessionFolder) -> Provenance {
     let kept = session.provenance();

@@ -495,6 +495,7 @@ fn promise_gigabytes(dense: &Path, path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
+// long: a list of cases, one after the other
 fn exports(bench: &mut Bench) {
     for (came_in, output, more, code, word) in [
         (
@@ -512,9 +513,16 @@ fn exports(bench: &mut Bench) {
             "give a factor above 0",
         ),
         (
-            "the same with `--assume-scale 2`",
+            "the same with `--assume-scale 2`, of a grid of 30 degrees",
             "@a.bsdf",
             &["--assume-scale", "2"],
+            1,
+            "or say that it is meant (--allow-coarse)",
+        ),
+        (
+            "the same with `--allow-coarse`",
+            "@a.bsdf",
+            &["--assume-scale", "2", "--allow-coarse"],
             0,
             "is the table's last",
         ),
@@ -563,6 +571,54 @@ fn exports(bench: &mut Bench) {
     ] {
         let arguments = [&["export", "@a.exr", "-o", output], more].concat();
         bench.case(came_in, &arguments, "", code, &[word]);
+    }
+    for (came_in, arguments, code, word) in [
+        (
+            "`export SAMPLES -o a.bsdf`",
+            &["export", "@silent.npy", "-o", "@b.bsdf"][..],
+            1,
+            "does not hold samples; name it .json (BiRD)",
+        ),
+        (
+            "`export SAMPLES -o a.json --error ERR.exr`",
+            &[
+                "export",
+                "@silent.npy",
+                "-o",
+                "@b.json",
+                "--error",
+                "@a.exr",
+            ],
+            1,
+            "--error: goes with a dense BRDF",
+        ),
+        (
+            "`export DENSE.exr --dense DENSE.exr`",
+            &["export", "@a.exr", "-o", "@b.json", "--dense", "@a.exr"],
+            1,
+            "goes with samples, and",
+        ),
+        (
+            "`export SAMPLES -o a.json` of relative samples",
+            &["export", "@silent.npy", "-o", "@b.json"],
+            1,
+            "give the factor that makes it so",
+        ),
+        (
+            "the same with `--assume-scale 2`",
+            &[
+                "export",
+                "@silent.npy",
+                "-o",
+                "@b.json",
+                "--assume-scale",
+                "2",
+            ],
+            0,
+            "says nothing of their rig",
+        ),
+    ] {
+        bench.case(came_in, arguments, "", code, &[word]);
     }
 }
 

@@ -76,7 +76,7 @@ pub fn write_dense_by_rows(
 }
 
 /// Writes the standard errors of a dense BRDF whole, in the unit of its values, with each cell's
-/// origin (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated). Where `combine` is given, they are combined
+/// origin (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated, 4 by symmetry). Where `combine` is given, they are combined
 /// with what it knows, and the parts are written too, as shares.
 ///
 /// # Errors

@@ -1,5 +1,5 @@
 //! Standard errors of a dense BRDF as an EXR of the same layout: its channels in the unit of the
-//! values, and a channel `origin` (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated).
+//! values, and a channel `origin` (0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated, 4 by symmetry).
 
 use crate::exr_planes::{ExrPlanes, Plane};
 use crate::exr_rows::write_rows;

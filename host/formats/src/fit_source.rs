@@ -3,7 +3,7 @@
 
 use crate::whole_file::folder_of;
 use crate::{FileError, checksum};
-use gonia_brdf::SymmetryKind;
+use gonia_brdf::{MirrorPlane, SymmetryKind};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
@@ -13,6 +13,8 @@ use std::path::{Component, Path, PathBuf};
 pub struct FitSource {
     /// Without it, the samples show it.
     pub symmetry: Option<SymmetryKind>,
+    /// Its plane, where that was stated.
+    pub plane: Option<MirrorPlane>,
     /// The files of samples, in their order.
     pub files: Vec<SourceFile>,
 }
@@ -40,9 +42,34 @@ pub const FIT_SYMMETRY: &str = "fit_symmetry";
 /// What stands for a symmetry that the samples show.
 const AUTO: &str = "auto";
 
-/// The fact for [`FIT_SYMMETRY`].
-pub fn fit_symmetry(asked: Option<SymmetryKind>) -> &'static str {
-    asked.map_or(AUTO, SymmetryKind::name)
+/// Between the name of a symmetry and the azimuth of its plane, degrees, where that was stated.
+const ABOUT: &str = " about ";
+
+/// The fact for [`FIT_SYMMETRY`], of a symmetry and of its plane where that was stated.
+pub fn fit_symmetry(asked: Option<SymmetryKind>, plane: Option<MirrorPlane>) -> String {
+    let name = asked.map_or(AUTO, SymmetryKind::name);
+    match plane {
+        Some(plane) => format!("{name}{ABOUT}{:.3}", plane.azimuth_deg()),
+        None => name.to_owned(),
+    }
+}
+
+/// What such a fact says; `None` of others.
+fn symmetry_of(fact: &str) -> Option<(Option<SymmetryKind>, Option<MirrorPlane>)> {
+    let (name, plane) = match fact.split_once(ABOUT) {
+        Some((name, azimuth)) => {
+            let azimuth: f64 = azimuth.parse().ok()?;
+            (
+                name,
+                Some(MirrorPlane::at_deg(azimuth)).filter(|_| azimuth.is_finite()),
+            )
+        }
+        None => (fact, None),
+    };
+    match name {
+        AUTO => Some((None, None)).filter(|_| plane.is_none()),
+        name => Some((Some(SymmetryKind::named(name)?), plane)),
+    }
 }
 
 fn place_key(number: usize) -> String {
@@ -75,10 +102,7 @@ pub fn files_of_samples(
 impl FitSource {
     /// What a dense BRDF's provenance says; `None` where its values are not those of a fit that can be made again.
     pub fn of(provenance: &BTreeMap<String, String>) -> Option<Self> {
-        let symmetry = match provenance.get(FIT_SYMMETRY)?.as_str() {
-            AUTO => None,
-            name => Some(SymmetryKind::named(name)?),
-        };
+        let (symmetry, plane) = symmetry_of(provenance.get(FIT_SYMMETRY)?)?;
         let file = |number| {
             Some(SourceFile {
                 place: of_ascii(provenance.get(&place_key(number))?),
@@ -86,7 +110,11 @@ impl FitSource {
             })
         };
         let files: Vec<SourceFile> = (1..).map_while(file).collect();
-        (!files.is_empty()).then_some(Self { symmetry, files })
+        (!files.is_empty()).then_some(Self {
+            symmetry,
+            plane,
+            files,
+        })
     }
 
     /// The files, from where the dense BRDF is: where they were, or beside it.
@@ -187,9 +215,12 @@ mod tests {
         assert_eq!(facts["samples_file.1"], "../measured/%C3%A9 100%2541.csv");
         assert_eq!(facts["samples_file.2"], "b.csv");
         assert_eq!(FitSource::of(&facts), None);
-        for asked in [None, Some(SymmetryKind::HalfTurnBilateral)] {
-            facts.insert(FIT_SYMMETRY.to_owned(), fit_symmetry(asked).to_owned());
-            assert_eq!(FitSource::of(&facts).unwrap().symmetry, asked);
+        let asked = Some(SymmetryKind::HalfTurnBilateral);
+        let plane = Some(MirrorPlane::at_deg(23.5));
+        for (asked, plane) in [(None, None), (asked, None), (asked, plane)] {
+            facts.insert(FIT_SYMMETRY.to_owned(), fit_symmetry(asked, plane));
+            let source = FitSource::of(&facts).unwrap();
+            assert_eq!((source.symmetry, source.plane), (asked, plane));
         }
         let source = FitSource::of(&facts).unwrap();
         let same = |found: &Path, path: &Path| {
@@ -212,12 +243,20 @@ mod tests {
 
     #[test]
     fn a_symmetry_that_is_none_is_no_source() {
-        let facts = [
-            (FIT_SYMMETRY, "round"),
-            ("samples_file.1", "a.csv"),
-            ("samples_checksum.1", "00000000"),
-        ];
-        let facts = facts.map(|(name, fact)| (name.to_owned(), fact.to_owned()));
-        assert_eq!(FitSource::of(&facts.into()), None);
+        for symmetry in [
+            "round",
+            "bilateral about",
+            "bilateral about north",
+            "auto about 20.0",
+            "round about 20.0",
+        ] {
+            let facts = [
+                (FIT_SYMMETRY, symmetry),
+                ("samples_file.1", "a.csv"),
+                ("samples_checksum.1", "00000000"),
+            ];
+            let facts = facts.map(|(name, fact)| (name.to_owned(), fact.to_owned()));
+            assert_eq!(FitSource::of(&facts.into()), None, "{symmetry}");
+        }
     }
 }

@@ -199,6 +199,24 @@ pub fn write_noted_samples(
     sample_note::write_beside(path, (!holds_notes).then_some(note))
 }
 
+/// As [`write_noted_samples`]; a table of text has columns `u_scale_r` … beside the values: the standard uncertainty
+/// (k = 1, in their unit) that the rig gives them. Other formats have no names for columns, and are as without.
+///
+/// # Errors
+/// As [`write_samples`].
+pub fn write_noted_samples_with_u(
+    path: &Path,
+    samples: &[Sample],
+    u: &[[f32; 3]],
+    note: &SampleNote,
+) -> Result<(), FileError> {
+    if !is_text(path) {
+        return write_noted_samples(path, samples, note);
+    }
+    samples_csv::write_with_u(path, samples, u, Some(note))?;
+    sample_note::write_beside(path, None)
+}
+
 /// As [`write_noted_samples`], of other channels than colours.
 ///
 /// # Errors

@@ -171,8 +171,30 @@ impl NumberRow for Numbers<'_, '_> {
 
 fn write(path: &Path, samples: &[Sample], note: Option<&SampleNote>) -> Result<(), FileError> {
     let values = samples.iter().map(|s| &s.rgb[..]);
-    write_rows(path, &Channels::Rgb, samples, values, note)
+    let names = Channels::Rgb.column_names();
+    write_rows(path, &names, samples, values, note)
 }
+
+/// As [`write`], with a standard uncertainty beside each value.
+pub(super) fn write_with_u(
+    path: &Path,
+    samples: &[Sample],
+    u: &[[f32; 3]],
+    note: Option<&SampleNote>,
+) -> Result<(), FileError> {
+    let values: Vec<[f32; 6]> = samples
+        .iter()
+        .zip(u)
+        .map(|(s, u)| [s.rgb[0], s.rgb[1], s.rgb[2], u[0], u[1], u[2]])
+        .collect();
+    let colours = Channels::Rgb.column_names();
+    let names = colours.iter().map(|name| format!("{U_SCALE}{name}"));
+    let names: Vec<String> = colours.iter().cloned().chain(names).collect();
+    write_rows(path, &names, samples, values.iter().map(|v| &v[..]), note)
+}
+
+/// What stands before a channel's name where a column holds the uncertainty of its values that all samples share.
+const U_SCALE: &str = "u_scale_";
 
 fn write_channels(
     path: &Path,
@@ -180,13 +202,14 @@ fn write_channels(
     note: Option<&SampleNote>,
 ) -> Result<(), FileError> {
     let values = samples.values.chunks_exact(samples.channels.count());
-    write_rows(path, &samples.channels, &samples.places, values, note)
+    let names = samples.channels.column_names();
+    write_rows(path, &names, &samples.places, values, note)
 }
 
 /// Writes places, and the values of each.
 fn write_rows<'a, const N: usize>(
     path: &Path,
-    channels: &Channels,
+    names: &[String],
     places: &[Sample<N>],
     values: impl Iterator<Item = &'a [f32]>,
     note: Option<&SampleNote>,
@@ -196,7 +219,7 @@ fn write_rows<'a, const N: usize>(
         if let Some(note) = note {
             write_comments(out, note)?;
         }
-        let names = channels.column_names().join(",");
+        let names = names.join(",");
         let frame = if with_frames { ",frame" } else { "" };
         writeln!(out, "{},{names}{frame}", COLUMNS[..4].join(","))?;
         for (s, values) in places.iter().zip(values) {
@@ -377,6 +400,30 @@ mod tests {
             assert_eq!(frames, [7, Sample::NO_FRAME, Sample::NO_FRAME], "{name}");
             assert!(remarks.is_empty());
         }
+    }
+
+    #[test]
+    fn uncertainties_are_columns_that_other_readers_of_samples_pass_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("samples.csv");
+        let at = |deg: f64| gonia_brdf::Direction::from_deg(deg, 2.0 * deg);
+        let samples = [
+            Sample::new(at(10.0), at(20.0), [0.1, 0.2, 0.3]).in_frame(4),
+            Sample::new(at(30.0), at(40.0), [0.4, 0.5, 0.6]).in_frame(5),
+        ];
+        let u = [[0.01, 0.02, 0.03], [0.04, 0.05, 0.06]];
+        super::write_with_u(&path, &samples, &u, None).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(
+            lines.next().unwrap(),
+            "theta_i,phi_i,theta_v,phi_v,r,g,b,u_scale_r,u_scale_g,u_scale_b,frame"
+        );
+        assert_eq!(
+            lines.next().unwrap(),
+            "10,20,20,40,0.1,0.2,0.3,0.01,0.02,0.03,4"
+        );
+        assert_eq!(read_samples(&path).unwrap().samples, samples);
     }
 
     #[test]

@@ -77,6 +77,22 @@ pub enum Error {
         /// The format's name.
         format: &'static str,
     },
+    /// An export of a grid that is much coarser than the format's directions, which is not said to be meant.
+    #[error(
+        "{path}: its step of {step_deg} degrees is coarser than the {format_deg} degrees of {format}, where interpolated values would pass for measured ones: fill a finer grid (gonia fill --step), {formats}or say that it is meant (--allow-coarse)"
+    )]
+    TooCoarse {
+        /// The table.
+        path: String,
+        /// Its step.
+        step_deg: f64,
+        /// About how far the format's directions lie apart.
+        format_deg: f64,
+        /// The format.
+        format: &'static str,
+        /// What else there is, with a comma at its end.
+        formats: String,
+    },
     /// An export of uncertainties to a format that has no place for them.
     #[error(
         "the format {format} has no place for uncertainties: leave --error out, or give --format netcdf, zarr or bird"

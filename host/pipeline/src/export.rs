@@ -4,7 +4,7 @@ use crate::colours::colours_of;
 use crate::error::Error;
 use crate::provenance::{SCALE_ASSUMED, scale_assumed};
 use gonia_brdf::{DenseBrdf, Direction, Elementary, Pose, Sample};
-use gonia_formats::export::{ExportFormat, ExportSettings, Holds, How, Meaning, Point};
+use gonia_formats::export::{EXPORTS, ExportFormat, ExportSettings, Holds, How, Meaning, Point};
 use gonia_formats::foreign::ForeignBrdf;
 use gonia_rig::{Channels, DenseChannels, DenseFile, Remark, Scale};
 use rayon::prelude::*;
@@ -23,6 +23,8 @@ pub struct ExportSource<'a> {
     pub errors: Option<DenseChannels>,
     /// Takes a relative BRDF for 1/sr after multiplying it.
     pub scale_by: Option<f64>,
+    /// Whether a grid that is too coarse for the format is exported, and warned of.
+    pub allow_coarse: bool,
 }
 
 /// How far a file in another format is from the table that it was made of, as a reader of that format has
@@ -56,7 +58,8 @@ pub enum Places {
 /// to be said of the material in that format comes with it.
 ///
 /// # Errors
-/// The BRDF is relative, the format means 1/sr, and no `scale_by` is given; there are uncertainties, and the
+/// The BRDF is relative, the format means 1/sr, and no `scale_by` is given; the grid's step is more than twice the format's,
+/// and not `allow_coarse`; there are uncertainties, and the
 /// format has no place for them; the file cannot be written or read back.
 pub fn export(
     source: ExportSource<'_>,
@@ -67,13 +70,13 @@ pub fn export(
     let ExportSource {
         mut dense,
         mut errors,
-        ..
+        path: table,
+        scale_by,
+        allow_coarse,
     } = source;
-    let mut remarks: Vec<Remark> = too_coarse(&dense, source.path, format, resolution)
-        .into_iter()
-        .collect();
+    let mut remarks = Vec::new();
     if dense.scale == Scale::Relative {
-        match (source.scale_by, format.means) {
+        match (scale_by, format.means) {
             (Some(factor), _) => {
                 scale(&mut dense, factor);
                 errors.iter_mut().for_each(|errors| scale(errors, factor));
@@ -86,6 +89,18 @@ pub fn export(
             }
         }
     }
+    if errors.is_some() && !format.holds_uncertainties() {
+        return Err(Error::NoUncertainties {
+            format: format.title,
+        });
+    }
+    let format_deg = (format.step_deg)(resolution);
+    remarks.extend(check_step(
+        dense.grid.step_deg(),
+        format_deg,
+        format.title,
+        (table, allow_coarse),
+    )?);
     let error = match (&format.how, errors) {
         (How::Table { write, read }, errors) => {
             write(path, &dense, errors.as_ref())?;
@@ -95,18 +110,13 @@ pub fn export(
             remarks.extend(write(path, &dense, errors.as_ref(), resolution)?);
             of_points(&dense, &read(path)?)
         }
-        (_, Some(_)) => {
-            return Err(Error::NoUncertainties {
-                format: format.title,
-            });
-        }
-        (How::Brdf { write, read }, None) => {
-            let (dense, settings) = colours(dense, source.path, format, resolution, &mut remarks)?;
+        (How::Brdf { write, read }, _) => {
+            let (dense, settings) = colours(dense, table, format, resolution, &mut remarks)?;
             remarks.extend(write(path, &dense, &settings)?);
             of_brdf(&dense.brdf, read(path)?.as_ref())
         }
-        (How::Samples { write, read }, None) => {
-            let (dense, settings) = colours(dense, source.path, format, resolution, &mut remarks)?;
+        (How::Samples { write, read }, _) => {
+            let (dense, settings) = colours(dense, table, format, resolution, &mut remarks)?;
             remarks.extend(write(path, &dense, &settings)?);
             of_samples(&dense.brdf, &read(path)?)
         }
@@ -114,24 +124,54 @@ pub fn export(
     Ok((error, remarks))
 }
 
-/// What a file would pretend to know between the nodes of a coarse table.
-fn too_coarse(
-    dense: &DenseChannels,
-    path: &Path,
-    format: &ExportFormat,
-    resolution: usize,
-) -> Option<Remark> {
-    let (step, of_format) = (dense.grid.step_deg(), (format.step_deg)(resolution));
-    (of_format > 0.0 && step > 2.0 * of_format).then(|| {
-        Remark::new(
-            path.display(),
-            format_args!(
-                "its step of {step} degrees is coarser than the {of_format} degrees of {}: the file looks finer than it is",
-                format.title
-            ),
-            "fill a finer grid (gonia fill --step) for more than interpolated values",
-        )
-    })
+/// Whether a file would pretend to know what lies between the nodes of a table.
+fn is_too_coarse(step_deg: f64, format_deg: f64) -> bool {
+    format_deg > 0.0 && step_deg > 2.0 * format_deg
+}
+
+/// What is to be said of a table's step, if anything.
+fn check_step(
+    step_deg: f64,
+    format_deg: f64,
+    format: &'static str,
+    (table, allow_coarse): (&Path, bool),
+) -> Result<Option<Remark>, Error> {
+    if !is_too_coarse(step_deg, format_deg) {
+        return Ok(None);
+    }
+    if !allow_coarse {
+        return Err(too_coarse(table, step_deg, format_deg, format));
+    }
+    let text = format_args!(
+        "its step of {step_deg} degrees is coarser than the {format_deg} degrees of {format}: the file looks finer than it is"
+    );
+    let remedy = "fill a finer grid (gonia fill --step) for more than interpolated values";
+    Ok(Some(Remark::new(table.display(), text, remedy)))
+}
+
+/// Why such a table is not exported, with the formats that take it.
+fn too_coarse(table: &Path, step_deg: f64, format_deg: f64, format: &'static str) -> Error {
+    let fits = |other: &&&ExportFormat| {
+        let default = other.resolution.as_ref().map_or(0, |of| of.default);
+        !is_too_coarse(step_deg, (other.step_deg)(default))
+    };
+    let names: Vec<&str> = EXPORTS
+        .iter()
+        .filter(fits)
+        .map(|other| other.name)
+        .collect();
+    let formats = if names.is_empty() {
+        String::new()
+    } else {
+        format!("give --format {}, ", names.join(", "))
+    };
+    Error::TooCoarse {
+        path: table.display().to_string(),
+        step_deg,
+        format_deg,
+        format,
+        formats,
+    }
 }
 
 /// The table as the colours, or the one value, that a format holds.

@@ -40,6 +40,7 @@ pub mod compare;
 mod compare_bands;
 mod error;
 pub mod export;
+pub mod export_samples;
 mod fill;
 pub mod fit;
 pub mod process;

@@ -266,6 +266,7 @@ fn export<'py>(
     format: Option<&str>,
     resolution: Option<usize>,
     assume_scale: Option<f64>,
+    allow_coarse: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let format = export_format(&path, format).map_err(to_py)?;
     let resolution = match (resolution, &format.resolution) {
@@ -290,8 +291,12 @@ fn export<'py>(
         let source = ExportSource {
             dense: file,
             path: Path::new("the dense BRDF"),
-            errors: None,
+            errors: format
+                .holds_uncertainties()
+                .then(|| dense.uncertainties())
+                .flatten(),
             scale_by: assume_scale,
+            allow_coarse,
         };
         export_file(source, &path, format, resolution)
     })?;

@@ -37,6 +37,26 @@ pub struct Dense {
     pub remarks: Vec<String>,
 }
 
+impl Dense {
+    /// Its uncertainties as a table of their own, where they are known.
+    pub fn uncertainties(&self) -> Option<DenseChannels> {
+        let uncertainty = self.uncertainty.as_ref()?;
+        Some(DenseChannels {
+            planes: uncertainty.planes.clone(),
+            provenance: self.facts_of_errors(),
+            channels: self.file.channels.clone(),
+            ..self.file
+        })
+    }
+
+    /// Provenance of its uncertainties.
+    fn facts_of_errors(&self) -> BTreeMap<String, String> {
+        let mut facts = self.file.provenance.clone();
+        facts.insert(ERRORS_OF.to_owned(), checksum::of_channels(&self.file));
+        facts
+    }
+}
+
 #[pymethods]
 impl Dense {
     /// Reads a dense BRDF, and its uncertainties from a second file where one is given.
@@ -83,8 +103,7 @@ impl Dense {
             ))
         })?;
         let budget = budget_in(&self.file.provenance).map_err(to_py)?;
-        let mut facts = self.file.provenance.clone();
-        facts.insert(ERRORS_OF.to_owned(), checksum::of_channels(&self.file));
+        let mut facts = self.facts_of_errors();
         run_silently(py, || {
             let combine = budget.as_ref().and_then(|budget| {
                 facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());

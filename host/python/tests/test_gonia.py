@@ -193,7 +193,9 @@ def test_bands_compare_fit_and_render(dense, tmp_path):
 
 
 def test_exports_say_what_they_lost(dense, tmp_path):
-    found = dense.export(tmp_path / "f.bsdf")
+    with pytest.raises(gonia.GoniaError, match="coarser than the 4 degrees of RGL"):
+        dense.export(tmp_path / "f.bsdf")
+    found = dense.export(tmp_path / "f.bsdf", allow_coarse=True)
     assert (tmp_path / "f.bsdf").stat().st_size > 1000 and 0 <= found["median"] < 0.2
     with pytest.raises(gonia.GoniaError, match="bsdf"):
         dense.export(tmp_path / "f.unknown")

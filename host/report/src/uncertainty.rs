@@ -3,11 +3,12 @@
 use crate::panels;
 use crate::slices;
 use gonia_brdf::DenseBrdf;
+use gonia_brdf::interpolate::ErrorFall;
 use gonia_formats::dense::{read_dense, read_origins};
 use gonia_formats::{FileError, Summary};
 use gonia_pipeline::budget::{
     AlbedoUncertainty, CellBudget, Contribution, Holding, StratumBudget, albedo_uncertainty,
-    budget_in, not_stated, stated, summary,
+    budget_in, fall_in, not_stated, stated, summary, with_poses,
 };
 use gonia_pipeline::provenance::Provenance;
 use gonia_rig::{Budget, Scale, Stratum};
@@ -76,7 +77,7 @@ fn of_budget(bars: &ErrorBars, dense: &DenseBrdf, scale: Scale, budget: &Budget)
         (table(&parts, budget))
         (sentence(&parts, &albedos, &bars.provenance, budget, scale))
         div.sheets { (map(&cells)) }
-        (worth(&parts))
+        (worth(&parts, &poses(&cells, &bars.provenance)))
     }
 }
 
@@ -238,8 +239,22 @@ fn map(cells: &CellBudget<'_>) -> Markup {
     }
 }
 
-/// What halving a contribution is worth.
-fn worth(parts: &[StratumBudget]) -> Markup {
+/// The parts' uncertainties with more poses; `None` where nobody knows.
+type OfPoses = Vec<(Stratum, Option<f64>)>;
+
+/// What more poses buy, by the fall of the errors that the fill found: so many times as many.
+fn poses(cells: &CellBudget<'_>, provenance: &Provenance) -> Vec<(&'static str, OfPoses)> {
+    let fall = fall_in(provenance).filter(|fall| *fall != ErrorFall::default());
+    let with = |fall| {
+        [("twice the poses", 2.0), ("four times the poses", 4.0)]
+            .map(|(name, times)| (name, with_poses(cells, &fall, times)))
+            .to_vec()
+    };
+    fall.map(with).unwrap_or_default()
+}
+
+/// What halving a contribution is worth, and what more poses.
+fn worth(parts: &[StratumBudget], poses: &[(&'static str, OfPoses)]) -> Markup {
     let Some(of_all) = parts.iter().find(|of| of.stratum == Stratum::All) else {
         return html! {};
     };
@@ -256,8 +271,13 @@ fn worth(parts: &[StratumBudget]) -> Markup {
         h3 { "What would make it better" }
         p.soft {
             "The median U (k = 2) of each part, now and with one contribution half as large. Four times the exposure \
-             halves noise; what more poses buy is in the chart of gonia chart SAMPLES, which leaves frames out and measures \
-             it."
+             halves noise. "
+            @if poses.is_empty() {
+                "What more poses buy is in the chart of gonia chart SAMPLES, which leaves frames out and measures it."
+            } @else {
+                "What more poses buy is predicted from the errors at frames that were left out, by all other frames and by \
+                 half of them."
+            }
         }
         div.wide { table {
             thead { tr {
@@ -275,6 +295,14 @@ fn worth(parts: &[StratumBudget]) -> Markup {
                     td { (part.name()) }
                     @for of in parts { td.num { (percent(2.0 * of.halved[*place])) } }
                     td.soft { (part.remedy()) }
+                } }
+                @for (name, of_parts) in poses { tr {
+                    td { (name) }
+                    @for of in parts {
+                        @let u = of_parts.iter().find(|(part, _)| *part == of.stratum).and_then(|(_, u)| *u);
+                        td.num { (u.map_or("–".to_owned(), |u| percent(2.0 * u))) }
+                    }
+                    td.soft { "gonia plan --adaptive says where" }
                 } }
             }
         } }

@@ -206,6 +206,17 @@ pub const FIGURES: &[Figure] = &[
     ]),
     figure("growth", 3.0, Tables, &[run("cargo bench -p gonia-brdf --bench growth")]),
     figure("growth-few", 3.0, Tables, &[run("cargo bench -p gonia-brdf --bench growth -- --few")]),
+    figure("channels", 2.0, Tables, &[
+        run("cargo bench -p gonia-brdf --bench channels -- fabric preview"),
+        run("cargo bench -p gonia-brdf --bench channels -- fabric fast"),
+        run("cargo bench -p gonia-brdf --bench channels -- fabric default"),
+    ]),
+    figure("target-error", 5.0, Tables, &[
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.005"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.01"),
+        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.02"),
+    ]),
     figure("binning", 0.4, Tables, &[run("cargo bench -p gonia-brdf --bench bins")]),
     figure("block", 0.1, Tables, &[run("cargo bench -p gonia-brdf --bench block")]),
     figure("frames", 1.0, Tables, &[run("cargo bench -p gonia --bench frames")]),
@@ -233,6 +244,10 @@ pub const FIGURES: &[Figure] = &[
         "cargo bench -p gonia --bench adaptive -- --out {work}",
     )])
     .with(&[("adaptive.svg", "adaptive.svg")]),
+    figure("exports", 0.5, Tables, &[
+        QUICK,
+        run("cargo bench -p gonia --bench exports -- {work}/quick/dense.exr"),
+    ]),
     figure("plan", 0.1, Text, &[
         GONIA,
         QUICK,

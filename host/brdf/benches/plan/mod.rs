@@ -91,6 +91,32 @@ impl Poses {
         }
     }
 
+    /// The plan nearest to `n` poses with lights and views equally dense, in rings.
+    pub fn even(n: usize) -> Self {
+        let ring = |theta: f64, step: f64| {
+            let around = 360.0 * theta.to_radians().sine() / step;
+            (theta, around.round().max(1.0) as usize)
+        };
+        let plan = |step: f64| {
+            let rows = (75.0 / step).round().max(1.0);
+            let views: Vec<_> = (0..=rows as usize)
+                .map(|k| ring(75.0 * k as f64 / rows, step))
+                .collect();
+            let mut lights = views.clone();
+            lights.push(ring(85.0, step));
+            let (lights, views) = (directions(&lights), directions(&views));
+            Self {
+                lights,
+                views,
+                one_in: 1,
+            }
+        };
+        let plans = (0..400).map(|k| plan(8.0 + 0.1 * f64::from(k)));
+        let count = |plan: &Self| plan.lights.len() * plan.views.len();
+        let nearest = plans.min_by_key(|plan| count(plan).abs_diff(n));
+        nearest.unwrap_or_else(Self::paper)
+    }
+
     /// Every tenth of the paper's, of no regular pattern.
     pub fn tenth() -> Self {
         Self {

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin<const N: usize = 3> {
     /// The cell, see [`Grid::cell`].
-    pub cell: u32,
+    pub cell: u64,
     /// Number of samples.
     pub count: u32,
     /// Their frame when all came from the same one, else [`Sample::NO_FRAME`].
@@ -314,7 +314,7 @@ fn summarize<const N: usize>(
         }
     };
     Bin {
-        cell: cell as u32,
+        cell: cell as u64,
         count: group.len() as u32,
         frame,
         median: value,
@@ -351,6 +351,28 @@ mod tests {
             phi_v_deg: 90.0,
             rgb: [value, 2.0 * value, 3.0 * value],
             frame,
+        }
+    }
+
+    #[test]
+    fn a_grid_of_half_a_degree_has_more_cells_than_32_bits_count() {
+        let grid = Grid::with_step_deg(0.5).unwrap();
+        let sample = Sample {
+            theta_i_deg: 80.1,
+            phi_i_deg: 359.4,
+            theta_v_deg: 60.0,
+            phi_v_deg: 0.2,
+            rgb: [1.0; 3],
+            frame: 0,
+        };
+        let bins = Bins::new(grid, &[sample]);
+        let cell = bins.bins()[0].cell;
+        assert!(cell > u64::from(u32::MAX));
+        let (light, view) = grid.light_and_view(cell as usize);
+        let nodes =
+            [light, view].map(|d| (grid.direction(d).theta_deg(), grid.direction(d).phi_deg()));
+        for ((theta, phi), wanted) in nodes.into_iter().zip([(80.0, 359.5), (60.0, 0.0)]) {
+            assert!((theta - wanted.0).abs() < 1e-9 && (phi - wanted.1).abs() < 1e-9);
         }
     }
 

@@ -136,18 +136,14 @@ impl Rows {
 
     /// The bands, from the pole on: together all patches and all polar angles, each once.
     pub fn bands(&self) -> Vec<Band> {
-        // Patches come ring by ring of patches, each from its first polar angle to its last.
-        let ring = |d: Option<&u32>| d.map_or(0, |d| *d as usize / self.grid.n_phi());
-        let rings =
-            |patch: &Patch| ring(patch.directions.first())..ring(patch.directions.last()) + 1;
+        // Patches come ring by ring of patches.
         let mut bands: Vec<Band> = Vec::new();
         for (number, patch) in self.cover.patches.iter().enumerate() {
-            let rings = rings(patch);
             match bands.last_mut() {
-                Some(band) if band.rings == rings => band.patches.end = number + 1,
+                Some(band) if band.rings == patch.rows => band.patches.end = number + 1,
                 _ => bands.push(Band {
                     patches: number..number + 1,
-                    rings,
+                    rings: patch.rows.clone(),
                 }),
             }
         }
@@ -304,8 +300,18 @@ mod tests {
 
     #[test]
     fn rows_are_those_of_a_fill_in_memory_to_the_bit() {
+        assert_rows_are_those_in_memory(6.0, 24.0, 1);
+    }
+
+    #[test]
+    fn rows_of_several_patches_at_the_pole_are_those_in_memory_too() {
+        assert_rows_are_those_in_memory(4.0, 72.0, 2);
+    }
+
+    /// On a grid, with patches of a size, of which so many are at the pole.
+    fn assert_rows_are_those_in_memory(step_deg: f64, block_deg: f64, at_pole: usize) {
         let model = Kurt::two_thread_fabric();
-        let grid = Grid::with_step_deg(6.0).unwrap();
+        let grid = Grid::with_step_deg(step_deg).unwrap();
         let samples: Vec<Sample> = (0..40_000)
             .map(|k| {
                 let at = |a: f64, to: f64| ((k as f64 * a) % 1.0 * to) as f32;
@@ -329,7 +335,7 @@ mod tests {
         let bins = Bins::new(grid, &samples);
         // Tight enough that some pairs are refined.
         let settings = FillSettings {
-            block_deg: 24.0,
+            block_deg,
             neighbours: 32,
             ..FillSettings::DEFAULT
         };
@@ -339,6 +345,9 @@ mod tests {
         let planes = Mutex::new([(); 3].map(|()| vec![f32::NAN; n * n]));
         let (rows, kept) = (Rows::new(grid, &settings), InMemory::default());
         let solver = Solver::new(&data, &settings).unwrap();
+        let patches = &rows.cover.patches;
+        let found = patches.iter().filter(|p| p.rows.start == 0).count();
+        assert_eq!(found, at_pole);
         let half = rows.patches() / 2;
         // Two that solve, and then one a band that writes.
         let mut solved = solver.solve((0..half).collect(), &kept, &silent).unwrap();
@@ -362,7 +371,7 @@ mod tests {
         }
         assert_eq!(dense.planes(), &planes.into_inner().unwrap());
         let cells: usize = kept.0.into_inner().unwrap().values().map(Vec::len).sum();
-        assert!(cells > 0 && cells < n * n / 2, "{cells} of {}", n * n);
+        assert!(cells > 0 && 3 * cells < 2 * n * n, "{cells} of {}", n * n);
     }
 
     #[derive(Default)]
@@ -389,13 +398,16 @@ mod tests {
 
     #[test]
     fn bands_hold_all_patches_and_all_polar_angles_once() {
-        let grid = Grid::with_step_deg(2.0).unwrap();
-        let rows = Rows::new(grid, &FillSettings::DEFAULT);
-        let (mut patch, mut ring) = (0, 0);
-        for band in rows.bands() {
-            assert_eq!((band.patches.start, band.rings.start), (patch, ring));
-            (patch, ring) = (band.patches.end, band.rings.end);
+        // The finer one has several patches at the pole.
+        for step_deg in [2.0, 1.0] {
+            let grid = Grid::with_step_deg(step_deg).unwrap();
+            let rows = Rows::new(grid, &FillSettings::DEFAULT);
+            let (mut patch, mut ring) = (0, 0);
+            for band in rows.bands() {
+                assert_eq!((band.patches.start, band.rings.start), (patch, ring));
+                (patch, ring) = (band.patches.end, band.rings.end);
+            }
+            assert_eq!((patch, ring), (rows.patches(), grid.n_theta()));
         }
-        assert_eq!((patch, ring), (rows.patches(), grid.n_theta()));
     }
 }

@@ -17,7 +17,7 @@ use crate::sample::Sample;
 use rayon::prelude::*;
 
 /// Fewer tests than this are no evidence.
-const TESTS_MIN: usize = 100;
+pub(super) const TESTS_MIN: usize = 100;
 /// Clusters of samples without frames have about this size, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
@@ -25,6 +25,8 @@ const CLUSTER_DEG: f64 = 15.0;
 const MATES: usize = 64;
 /// Folds where there are few bins: one would decide by chance, and several are cheap then.
 const FOLDS: u32 = 4;
+/// Changes the numbers of groups for another choice of them.
+const HALVED: u32 = 0x5bd1_e995;
 /// Errors of so many groups, at least, are to be seen where there are as many.
 const GROUPS: usize = 64;
 
@@ -77,6 +79,12 @@ impl<'a, const N: usize> Fold<'a, N> {
     /// their bins: half of them among the brightest tenth, because an error that a few
     /// bright cells decide would else rest on a handful. `None` when there are too few to say anything.
     pub fn new(all: &'a Bins<N>, number: u32, one_in: u32, tests: usize) -> Option<Self> {
+        let fold = Self::one_of_many(all, number, one_in, tests)?;
+        (fold.tests.len() >= TESTS_MIN).then_some(fold)
+    }
+
+    /// The same however few its tests are: they count together with those of other folds.
+    pub fn one_of_many(all: &'a Bins<N>, number: u32, one_in: u32, tests: usize) -> Option<Self> {
         let bins = all.bins();
         let framed = bins.iter().any(|b| b.frame != Sample::NO_FRAME);
         let is_left_out = |bin: &Bin<N>| {
@@ -96,13 +104,27 @@ impl<'a, const N: usize> Fold<'a, N> {
             .collect();
         let tests = pick(left_out.clone(), tests);
         let trained = training.iter().filter(|is_used| **is_used).count();
-        (tests.len() >= TESTS_MIN && trained >= TESTS_MIN).then_some(Self {
+        (!tests.is_empty() && trained >= TESTS_MIN).then_some(Self {
             bins: all,
             training,
             left_out,
             framed,
             tests,
         })
+    }
+
+    /// The same tests, predicted by about half of the frames (or clusters) that predict.
+    pub fn halved(&self) -> Self {
+        let bins = self.bins.bins().iter();
+        // Another number than the one that folds are made of.
+        let stays = |bin: &Bin<N>| hash(group_of(bin, self.framed) ^ HALVED) >> 7 & 1 == 0;
+        let training = bins.zip(&self.training);
+        Self {
+            training: training.map(|(bin, used)| *used && stays(bin)).collect(),
+            left_out: self.left_out.clone(),
+            tests: self.tests.clone(),
+            ..*self
+        }
     }
 
     /// How many folds to take.

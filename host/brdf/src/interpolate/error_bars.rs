@@ -10,14 +10,14 @@
 
 use super::FillSettings;
 use super::block::kernel::{AnyKernel, NewBlock};
-use super::cross_validation::{Fold, MeanPrediction, Prediction};
+use super::cross_validation::{Fold, MeanPrediction, Prediction, TESTS_MIN};
 use super::data::Data;
 use super::datum::SIGMA_PER_MAD;
 use crate::bins::{Bin, variance_of_median};
 use crate::dense::DenseBrdf;
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
-use crate::quantile::quantile;
+use crate::quantile::{quantile, weighted_quantile};
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 pub const Z95: f32 = 1.96;
@@ -112,12 +112,13 @@ impl Calibration {
         let mut means = Vec::new();
         for number in 0..folds {
             let number = ONE_IN - 1 - number;
-            if let Some(fold) = Fold::new(bins, number, ONE_IN, TESTS / folds as usize) {
+            let fold = Fold::one_of_many(bins, number, ONE_IN, TESTS / folds as usize);
+            if let Some(fold) = fold {
                 means.extend(fold.predict_means(data, settings));
             }
         }
         let noise_variance = settings.noise_variance;
-        (!means.is_empty()).then(|| Self::from_means(&means, noise_variance))
+        (means.len() >= TESTS_MIN).then(|| Self::from_means(&means, noise_variance))
     }
 
     /// Calibrates on predictions of bins that took no part in the fit.
@@ -148,6 +149,19 @@ impl Calibration {
         calibration
     }
 
+    /// Whether a mean of left-out bins is at grazing angles, and whether it is very bright.
+    pub(super) fn place_of<const N: usize>(&self, of: &MeanPrediction<N>) -> (bool, bool) {
+        let bin = of.first.bin;
+        let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
+        let part = self.part(light, view, of.first.log);
+        (part >= 3, part % 3 == 2)
+    }
+
+    /// The variance that the noise of its bins gives such a mean, of one channel.
+    pub(super) fn noise_of<const N: usize>(&self, of: &MeanPrediction<N>, channel: usize) -> f32 {
+        self.noise.of_mean(of, channel)
+    }
+
     fn part<const N: usize>(&self, light: Vec3, view: Vec3, log: [f32; N]) -> usize {
         let grazing = light[2].min(view[2]) < GRAZING_DEG.to_radians().cosine();
         let brighter = self.bright.iter().filter(|bright| mean(log) > **bright);
@@ -176,9 +190,9 @@ impl Calibration {
         let (light, view) = (bin.light.map(f64::from), bin.view.map(f64::from));
         let error = self.standard_error(light, view, prediction.log, prediction.variance);
         (0..N).filter_map(move |c| {
-            let residual = prediction.residual[c]?;
             let noise = self.noise.of(bin, c);
-            Some(residual.powi(2) <= Z95 * Z95 * (error[c] * error[c] + noise))
+            let residual = Residual::new(prediction.residual[c], (1.0, noise), 1.0)?;
+            Some(residual.limit <= error[c] * error[c] + noise)
         })
     }
 }
@@ -195,7 +209,7 @@ impl BinNoise {
             .flat_map(|m| {
                 let p = m.first;
                 (0..N).filter_map(move |c| {
-                    Residual::new(p.residual[c], p.variance[c], stated.of(p.bin, c))
+                    Residual::new(p.residual[c], (p.variance[c], stated.of(p.bin, c)), 1.0)
                 })
             })
             .map(|r| (r.noise, USUAL_FACTOR.powi(2) * r.variance, r.limit))
@@ -208,6 +222,12 @@ impl BinNoise {
             factor: factor.unwrap_or(1.0).clamp(0.5, 2.0),
             ..stated
         }
+    }
+
+    /// The same of the mean of some.
+    fn of_mean<const N: usize>(&self, mean: &MeanPrediction<N>, channel: usize) -> f32 {
+        let sum: f32 = mean.bins.iter().map(|bin| self.of(bin, channel)).sum();
+        sum / (mean.bins.len() as f32).powi(2)
     }
 
     /// Variance of the logarithm of a bin's median about the true value at the mean direction, of one
@@ -226,6 +246,8 @@ impl BinNoise {
 
 /// A residual of one channel.
 struct Residual {
+    /// How many left-out bins it stands for.
+    weight: f32,
     /// The variance with which the residual just lies within a 95 % interval.
     limit: f32,
     /// That of the prediction, not calibrated.
@@ -235,9 +257,13 @@ struct Residual {
 }
 
 impl Residual {
-    fn new(residual: Option<f32>, variance: f32, noise: f32) -> Option<Self> {
+    /// Of a logarithm of predicted over measured. A standard error is a share of the predicted value, so that this share
+    /// is compared with it: the logarithm itself would be too little where the prediction is far too small.
+    fn new(residual: Option<f32>, (variance, noise): (f32, f32), weight: f32) -> Option<Self> {
+        let share = (-residual?).exponential() - 1.0;
         Some(Self {
-            limit: (residual? / Z95).powi(2),
+            weight,
+            limit: (share / Z95).powi(2),
             variance: variance.max(1e-12),
             noise,
         })
@@ -253,10 +279,9 @@ impl Residual {
         mean: &'a MeanPrediction<'a, N>,
         noise: &'a BinNoise,
     ) -> impl Iterator<Item = Self> + 'a {
-        let count = mean.bins.len() as f32;
         (0..N).filter_map(move |c| {
-            let sum: f32 = mean.bins.iter().map(|bin| noise.of(bin, c)).sum();
-            Self::new(mean.residual[c], mean.variance[c], sum / (count * count))
+            let variances = (mean.variance[c], noise.of_mean(mean, c));
+            Self::new(mean.residual[c], variances, mean.first.weight)
         })
     }
 }
@@ -303,12 +328,13 @@ impl Classes {
         others: &Self,
         noise: &BinNoise,
     ) -> Self {
-        let mut squares: Vec<f32> = means
+        let mut squares: Vec<(f32, f32)> = means
             .iter()
             .flat_map(|mean| Residual::of_mean(mean, noise))
-            .map(|r| r.beyond_noise())
+            .map(|r| (r.beyond_noise(), r.weight))
             .collect();
-        let own = quantile(&mut squares, 0.95).unwrap_or(0.0).max(0.0).sqrt();
+        let own = weighted_quantile(&mut squares, 0.95);
+        let own = own.unwrap_or(0.0).max(0.0).sqrt();
         let widest = others
             .factors
             .iter()
@@ -327,7 +353,9 @@ impl Classes {
 }
 
 /// The factor with which 95 % of the residuals lie within 1.96 standard errors: of each residual the
-/// square of the factor that just reaches it, and of these the 95th percentile; then the mean of that
+/// square of the factor that just reaches it, and of these the 95th percentile, each by how many left-out bins it stands
+/// for (bins that were measured bright are tested more often: unweighted, those that are predicted bright and are not
+/// would count too little); then the mean of that
 /// and of the usual one, weighted by their uncertainties. Of residuals that are nearly all noise, the
 /// percentile says nothing.
 fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> f32 {
@@ -335,15 +363,18 @@ fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> 
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
         .collect();
-    let mut squares: Vec<f32> = all.iter().map(Residual::beyond_noise).collect();
+    let mut squares: Vec<(f32, f32)> = all.iter().map(|r| (r.beyond_noise(), r.weight)).collect();
     let usual = USUAL_FACTOR * USUAL_FACTOR;
-    let Some(square) = quantile(&mut squares, 0.95) else {
+    let Some(square) = weighted_quantile(&mut squares, 0.95) else {
         return USUAL_FACTOR;
     };
-    let sum = |of: fn(&Residual) -> f32| all.iter().map(of).sum::<f32>();
+    let sum = |of: fn(&Residual) -> f32| all.iter().map(|r| r.weight * of(r)).sum::<f32>();
     let noise_share = sum(|r| r.noise) / (sum(|r| r.variance) * square.max(usual));
-    // The channels of a bin share their error: they count as one.
-    let by_chance = PERCENTILE_SPREAD * (1.0 + noise_share) / (class.len() as f32).sqrt();
+    // The channels of a bin share their error: they count as one. Unequal weights count as fewer equal ones.
+    let weights = class.iter().map(|mean| mean.first.weight);
+    let (sum, squares) = weights.fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+    let count = sum * sum / squares.max(f32::MIN_POSITIVE);
+    let by_chance = PERCENTILE_SPREAD * (1.0 + noise_share) / count.max(1.0).sqrt();
     let by_noise = NOISE_SPREAD * noise_share;
     let uncertainty = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
     let weight = 1.0 / (1.0 + uncertainty);

@@ -131,14 +131,29 @@ where
                 values.store_both(grid, pair, &work.logs);
                 if calibration.is_some() {
                     errors.load(grid, pair, &mut work.errors);
+                    let gain = corners.mean_square_shift(&task.cover, (p, q), &mut work.shifts);
+                    let share = blended_over_block(&work.errors, gain);
                     for (error, value) in work.errors.iter_mut().zip(&work.logs) {
-                        *error = std::array::from_fn(|c| error[c] * value[c]);
+                        *error = std::array::from_fn(|c| share[c] * error[c] * value[c]);
                     }
                     errors.store_both(grid, pair, &work.errors);
                 }
             }
         });
     Ok((values.into_planes(grid), errors.into_planes(grid)))
+}
+
+/// The error of blended values over that of the pair's own block, by the mean square that blending shifts its cells by. One
+/// pair's shifts are uncertain, so that at most three quarters of the variance are taken off.
+fn blended_over_block<const N: usize>(errors: &[[f32; N]], gain: [f32; N]) -> [f32; N] {
+    let mut variance = [0.0f32; N];
+    for error in errors {
+        for c in 0..N {
+            variance[c] += error[c] * error[c] / errors.len() as f32;
+        }
+    }
+    let of_channel = |c: usize| (1.0 - gain[c] / variance[c].max(f32::MIN_POSITIVE)).max(0.25);
+    std::array::from_fn(|c| of_channel(c).sqrt())
 }
 
 /// Takes a pair of patches: into what is kept of the first one's, what was solved, and the two.

@@ -17,6 +17,7 @@ pub mod cross_validation;
 pub mod data;
 pub mod datum;
 pub mod error_bars;
+mod error_fall;
 pub mod exponential;
 pub mod fill;
 pub mod from_corners;
@@ -33,8 +34,9 @@ pub use by_rows::{Band, KeptCells, Rows, Solver};
 pub use coordinates::Coordinates;
 pub use data::Data;
 pub use error_bars::{Calibration, ErrorBars};
+pub use error_fall::ErrorFall;
 pub use fill::{FillError, fill, fill_with_errors};
-pub use origin::{IsotropicOrigins, Origin, OriginCounts, origins};
+pub use origin::{IsotropicOrigins, Origin, OriginCounts, origins, origins_with_images};
 pub use select::{Candidate, Selection, select};
 
 /// How to interpolate.
@@ -45,6 +47,9 @@ pub struct FillSettings {
     /// A block is refined where a finer one differs from it by more than this many standard deviations
     /// of one sample: with 0 everywhere, with infinity nowhere.
     pub tolerance: f32,
+    /// And by more than this relative difference, whatever the noise, 0 ..= ∞: [`select()`] raises the tolerance to it.
+    /// The smaller the noise, the more blocks differ by it; what nobody needs to know is not refined.
+    pub target_error: f32,
     /// What refinement may cost, in fine blocks a pair of patches, on average: [`select()`] raises the
     /// tolerance to it.
     pub budget: f32,
@@ -107,6 +112,7 @@ impl Preset {
         FillSettings {
             block_deg,
             tolerance,
+            target_error: TARGET_ERROR,
             budget,
             neighbours,
             one_bin_in,
@@ -165,6 +171,8 @@ impl FillSettings {
     }
 }
 
+/// Relative errors below this are refined on no one's behalf: two hundredths of a ΔE00.
+const TARGET_ERROR: f32 = 0.002;
 /// Two fits through different data never agree better than this, whatever the samples' noise.
 const NOISE_MIN: f32 = 0.003;
 

@@ -1,10 +1,11 @@
-//! Where a cell's value comes from: measured, interpolated or extrapolated.
+//! Where a cell's value comes from: measured, by reciprocity, by symmetry, interpolated or extrapolated.
 
 use crate::bins::Bins;
 use crate::direction::{Vec3, dot};
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Where a cell's value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub enum Origin {
     /// Beyond all measured pairs of polar angles, or in a gap of the directions: a guess, however small
     /// its error seems.
     Extrapolated = 3,
+    /// Samples fell into a cell that a symmetry of the material, alone or with reciprocity, makes the same.
+    Symmetric = 4,
 }
 
 /// How many cells have their value from where.
@@ -32,6 +35,8 @@ pub struct OriginCounts {
     pub interpolated: u64,
     /// [`Origin::Extrapolated`].
     pub extrapolated: u64,
+    /// [`Origin::Symmetric`].
+    pub symmetric: u64,
 }
 
 impl OriginCounts {
@@ -45,7 +50,7 @@ impl OriginCounts {
             .par_iter()
             .map(|bin| {
                 let (light, view) = grid.light_and_view(bin.cell as usize);
-                let mirrored = grid.cell(view, light) as u32;
+                let mirrored = grid.cell(view, light) as u64;
                 let alone = all.binary_search_by_key(&mirrored, |b| b.cell).is_err();
                 // Both have the same origin: what is near and within reach is so for either order.
                 let within = reach.origin(light, view) == Origin::Interpolated;
@@ -60,12 +65,33 @@ impl OriginCounts {
             reciprocal,
             interpolated,
             extrapolated: grid.n_cells() as u64 - measured - reciprocal - interpolated,
+            symmetric: 0,
         }
+    }
+
+    /// The same, of bins that hold images by a symmetry: `own` are the cells, ascending, into which samples fell themselves.
+    pub fn with_images<const N: usize>(bins: &Bins<N>, own: &[u64]) -> Self {
+        Self::of(bins).without_images(bins.grid(), own, |_| 1)
+    }
+
+    /// What is measured in more than one's own cells is so by symmetry; a cell stands for `repeats` ones.
+    fn without_images(mut self, grid: Grid, own: &[u64], repeats: impl Fn(u64) -> u64) -> Self {
+        let both = self.measured + self.reciprocal;
+        let mirrored = |cell: u64| {
+            let (light, view) = grid.light_and_view(cell as usize);
+            grid.cell(view, light) as u64
+        };
+        let is_alone = |cell: &&u64| own.binary_search(&mirrored(**cell)).is_err();
+        self.measured = own.iter().map(|cell| repeats(*cell)).sum();
+        self.reciprocal = own.iter().filter(is_alone).map(|cell| repeats(*cell)).sum();
+        self.symmetric = both - self.measured - self.reciprocal;
+        self
     }
 
     /// Cells that are extrapolated, over all, 0 ..= 1.
     pub fn extrapolated_share(&self) -> f64 {
-        let all = self.measured + self.reciprocal + self.interpolated + self.extrapolated;
+        let known = self.measured + self.reciprocal + self.symmetric;
+        let all = known + self.interpolated + self.extrapolated;
         self.extrapolated as f64 / all.max(1) as f64
     }
 }
@@ -169,6 +195,8 @@ fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
 /// Where the values of an isotropic BRDF come from: what is measured at one azimuth is so at all.
 pub struct IsotropicOrigins {
     grid: Grid,
+    /// Cells into which samples fell, ascending.
+    own: Vec<u64>,
     /// By rows of light and of view, and the difference of azimuths: an [`Origin`] each.
     table: Vec<u8>,
 }
@@ -219,7 +247,8 @@ impl IsotropicOrigins {
         for cell in &cells {
             set(*cell, Origin::Measured);
         }
-        Self { grid, table }
+        let own = bins.bins().iter().map(|bin| bin.cell).collect();
+        Self { grid, own, table }
     }
 
     /// How many cells have their value from where.
@@ -228,33 +257,77 @@ impl IsotropicOrigins {
             let cells = self.table.iter().filter(|o| **o == origin as u8).count();
             (cells * self.grid.n_phi()) as u64
         };
-        OriginCounts {
+        let counts = OriginCounts {
             measured: count(Origin::Measured),
             reciprocal: count(Origin::Reciprocal),
             interpolated: count(Origin::Interpolated),
             extrapolated: count(Origin::Extrapolated),
-        }
+            symmetric: 0,
+        };
+        counts.without_images(self.grid, &self.own, |cell| {
+            let (light, view) = self.grid.light_and_view(cell as usize);
+            (repeats(self.grid, light).len() * repeats(self.grid, view).len()) as u64
+        })
     }
 
     /// An [`Origin`] a cell of the grid.
     pub fn of_cells(&self) -> Vec<u8> {
         let (n_theta, n_phi) = (self.grid.n_theta(), self.grid.n_phi());
         let n = self.grid.n_directions();
-        (0..n)
+        let mut origins: Vec<u8> = (0..n)
             .into_par_iter()
             .flat_map_iter(|light| {
                 (0..n).map(move |view| {
                     let (i, v) = (light / n_phi, view / n_phi);
                     let turn = (view % n_phi + n_phi - light % n_phi) % n_phi;
-                    self.table[(i * n_theta + v) * n_phi + turn]
+                    match self.table[(i * n_theta + v) * n_phi + turn] {
+                        origin if origin <= Origin::Reciprocal as u8 => Origin::Symmetric as u8,
+                        origin => origin,
+                    }
                 })
             })
-            .collect()
+            .collect();
+        mark(&mut origins, self.grid, &self.own, |direction| {
+            repeats(self.grid, direction)
+        });
+        origins
+    }
+}
+
+/// The directions that are the same as this one: at the pole all of its azimuths.
+fn repeats(grid: Grid, direction: usize) -> Range<usize> {
+    match direction < grid.n_phi() {
+        true => 0..grid.n_phi(),
+        false => direction..direction + 1,
+    }
+}
+
+/// Puts down which cells samples fell into, and which by reciprocity.
+fn mark(origins: &mut [u8], grid: Grid, own: &[u64], repeats: impl Fn(usize) -> Range<usize>) {
+    for origin in [Origin::Reciprocal, Origin::Measured] {
+        for cell in own {
+            let (light, view) = grid.light_and_view(*cell as usize);
+            for light in repeats(light) {
+                for view in repeats(view) {
+                    let cell = match origin {
+                        Origin::Measured => grid.cell(light, view),
+                        _ => grid.cell(view, light),
+                    };
+                    origins[cell] = origin as u8;
+                }
+            }
+        }
     }
 }
 
 /// Where each cell's value comes from, as an [`Origin`] a cell.
 pub fn origins<const N: usize>(bins: &Bins<N>) -> Vec<u8> {
+    let own: Vec<u64> = bins.bins().iter().map(|bin| bin.cell).collect();
+    origins_with_images(bins, &own)
+}
+
+/// The same, of bins that hold images by a symmetry: `own` are the cells, ascending, into which samples fell themselves.
+pub fn origins_with_images<const N: usize>(bins: &Bins<N>, own: &[u64]) -> Vec<u8> {
     let grid = bins.grid();
     let (reach, n) = (Reach::new(bins), grid.n_directions());
     let mut origins: Vec<u8> = (0..n)
@@ -264,13 +337,17 @@ pub fn origins<const N: usize>(bins: &Bins<N>) -> Vec<u8> {
             (0..n).map(move |view| reach.origin(light, view) as u8)
         })
         .collect();
-    for bin in bins.bins() {
-        let (light, view) = grid.light_and_view(bin.cell as usize);
-        origins[grid.cell(view, light)] = Origin::Reciprocal as u8;
+    if own.len() < bins.bins().len() {
+        for bin in bins.bins() {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            for cell in [grid.cell(light, view), grid.cell(view, light)] {
+                origins[cell] = Origin::Symmetric as u8;
+            }
+        }
     }
-    for bin in bins.bins() {
-        origins[bin.cell as usize] = Origin::Measured as u8;
-    }
+    mark(&mut origins, grid, own, |direction| {
+        direction..direction + 1
+    });
     origins
 }
 
@@ -280,6 +357,7 @@ mod tests {
     use super::*;
     use crate::direction::Direction;
     use crate::sample::Sample;
+    use crate::symmetry::Symmetry;
 
     #[test]
     fn counts_are_those_of_the_cells() {
@@ -303,9 +381,55 @@ mod tests {
                 reciprocal: count(Origin::Reciprocal),
                 interpolated: count(Origin::Interpolated),
                 extrapolated: count(Origin::Extrapolated),
+                symmetric: 0,
             };
             assert_eq!(OriginCounts::of(&bins), counted);
             assert!(counted.reciprocal > 0 && counted.extrapolated > 0);
+        }
+    }
+
+    #[test]
+    fn what_an_image_shows_is_by_symmetry_and_not_measured() {
+        let grid = Grid::with_step_deg(10.0).unwrap();
+        let samples: Vec<Sample> = (0..40)
+            .map(|k| {
+                let k = f64::from(k);
+                let light = Direction::from_deg(k * 7.0 % 70.0, 10.0);
+                let view = Direction::from_deg(k * 13.0 % 84.0, k * 37.0);
+                Sample::new(light, view, [1.0; 3])
+            })
+            .collect();
+        let plain = Bins::new(grid, &samples);
+        let own: Vec<u64> = plain.bins().iter().map(|bin| bin.cell).collect();
+        let completed = Bins::new(grid, &Symmetry::HalfTurn.completed(samples));
+        let isotropic = IsotropicOrigins::of(&plain, true);
+        let both = [
+            (
+                origins_with_images(&completed, &own),
+                OriginCounts::with_images(&completed, &own),
+            ),
+            (isotropic.of_cells(), isotropic.counts()),
+        ];
+        for (cells, counted) in both {
+            let count =
+                |origin: Origin| cells.iter().filter(|o| **o == origin as u8).count() as u64;
+            let found = OriginCounts {
+                measured: count(Origin::Measured),
+                reciprocal: count(Origin::Reciprocal),
+                interpolated: count(Origin::Interpolated),
+                extrapolated: count(Origin::Extrapolated),
+                symmetric: count(Origin::Symmetric),
+            };
+            assert_eq!(found, counted);
+            assert!(
+                own.iter()
+                    .all(|cell| cells[*cell as usize] == Origin::Measured as u8)
+            );
+            assert!(counted.symmetric > 30, "{counted:?}");
+            // Half a turn on, the same was measured; nothing was there.
+            let (light, view) = (grid.nearest(7.0, 190.0), grid.nearest(13.0, 217.0));
+            let cell = grid.cell(light.unwrap(), view.unwrap());
+            assert_eq!(cells[cell], Origin::Symmetric as u8);
         }
     }
 }

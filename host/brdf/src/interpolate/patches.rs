@@ -40,7 +40,8 @@ pub struct Patch {
     pub weights: Option<Weights>,
     /// Smaller patches of the same directions; none where the patch is of the smallest size.
     pub parts: Vec<Part>,
-    rows: Range<usize>,
+    /// Polar angles of its directions, by their numbers on the grid.
+    pub rows: Range<usize>,
     columns: Range<usize>,
 }
 
@@ -73,6 +74,10 @@ pub fn cover(grid: Grid, sizes_deg: &[f64]) -> Cover {
     Cover { patches, corners }
 }
 
+/// Most directions of a patch at the pole, where a grid's azimuths crowd: its cells with all views are in memory at a time. One
+/// on a grid of 2° or coarser stays whole.
+const MOST_OF_CAP: usize = 1500;
+
 /// Divides a lattice of rows and columns into patches.
 fn divide(grid: Grid, rows: Range<usize>, columns: Range<usize>, sizes_deg: &[f64]) -> Vec<Patch> {
     let Some((size_deg, smaller)) = sizes_deg.split_first() else {
@@ -85,9 +90,9 @@ fn divide(grid: Grid, rows: Range<usize>, columns: Range<usize>, sizes_deg: &[f6
     while first < rows.end {
         let last = (first + height).min(rows.end);
         let middle_deg = 0.5 * (first + last - 1) as f64 * step;
-        // The cap around the pole is one patch: its circumference is short all over.
+        // The circumference of the cap around the pole is short all over: it is divided only where its directions are many.
         let n_around = if first == 0 {
-            1
+            (columns.len() * height).div_ceil(MOST_OF_CAP)
         } else {
             let width_deg = columns.len() as f64 * step * middle_deg.to_radians().sine();
             ((width_deg / size_deg).round() as usize).clamp(1, columns.len())
@@ -295,9 +300,18 @@ mod tests {
 
     #[test]
     fn every_direction_is_in_one_patch_of_each_size_and_patches_are_small() {
-        for (step, sizes) in [(2.0, [8.0, 4.0]), (6.0, [12.0, 6.0]), (4.0, [8.0, 4.0])] {
+        for (step, sizes) in [
+            (2.0, [8.0, 4.0]),
+            (6.0, [12.0, 6.0]),
+            (4.0, [8.0, 4.0]),
+            (0.5, [8.0, 4.0]),
+        ] {
             let grid = Grid::with_step_deg(step).unwrap();
             let patches = cover(grid, &sizes).patches;
+            let at_pole = patches.iter().filter(|p| p.rows.start == 0).count();
+            assert_eq!(at_pole, if step < 1.0 { 8 } else { 1 });
+            let most = patches.iter().map(|p| p.directions.len()).max();
+            assert!(most.unwrap() <= MOST_OF_CAP, "{most:?}");
             check(grid, &patches.iter().collect::<Vec<_>>(), sizes[0]);
             let parts: Vec<&Patch> = patches
                 .iter()
@@ -353,7 +367,8 @@ mod tests {
                 }
             }
             // The pole, and corners of two rows of patches that never meet three at a time.
-            assert_eq!(patches_at[0], 1);
+            let at_pole = cover.patches.iter().filter(|p| p.rows.start == 0);
+            assert_eq!(patches_at[0], at_pole.count());
             let inner = cover
                 .corners
                 .iter()

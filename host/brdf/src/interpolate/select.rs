@@ -42,7 +42,8 @@ pub struct Selection {
 
 /// Takes the noise that the bins show, then compares the candidate coordinates by cross-validation,
 /// grouped by image (or, without frame numbers, by clusters of directions). With too few of these, `base`
-/// keeps its coordinates. The tolerance is raised where refinement would cost more than the budget.
+/// keeps its coordinates. The tolerance is raised to the target error, and where refinement would cost more than the
+/// budget.
 pub fn select<const N: usize>(data: &Data<N>, base: FillSettings) -> Selection
 where
     dyn AnyKernel: NewBlock<N>,
@@ -90,6 +91,11 @@ where
         .as_ref()
         .unwrap_or(data)
         .subset(settings.coordinates, |_| true);
+    // Where all is refined, all is.
+    if settings.tolerance > 0.0 {
+        let target = settings.target_error / settings.noise_sigma();
+        settings.tolerance = settings.tolerance.max(target);
+    }
     settings.tolerance = affordable_tolerance(&subset, &cover, &settings);
     Selection {
         settings,

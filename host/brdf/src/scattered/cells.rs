@@ -4,6 +4,7 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
 use super::places::{Near, distance2, exchanged, radius_of};
+use super::planes::{Block, Rows, planes_of, three};
 use super::quadratic::{Cells, Few, Nodes, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
@@ -11,11 +12,9 @@ use crate::direction::Direction;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
-use crate::interpolate::planes::spread_poles;
 use crate::symmetry::Symmetry;
 use pulp::Arch;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Side of the patches of directions that the work begins with, degrees.
 const PATCH_DEG: f64 = 16.0;
@@ -26,7 +25,7 @@ const NEIGHBOURS: usize = 7;
 /// So many images of the data, or fewer, make one system for all cells.
 const ONE_SYSTEM: usize = 192;
 /// Cells are interpolated where that is off by less than this share of the standard error …
-const TOLERANCE: f64 = 0.15;
+const TOLERANCE: f64 = 0.25;
 /// … or than this share of the value.
 const TOLERANCE_MIN: f64 = 1e-3;
 /// So many cells are not worth a test.
@@ -36,66 +35,6 @@ const DIRECT: usize = 40;
 const HALVED_AGAIN: f64 = 1.15;
 /// Places between cells are so many parts of a step apart.
 const PARTS: f64 = 4.0;
-
-/// Planes that many threads write to, each cell once.
-struct Shared(Vec<Vec<AtomicU32>>);
-
-impl Shared {
-    fn new(grid: Grid, channels: usize) -> Self {
-        let plane = || {
-            let cells = (0..grid.n_cells()).into_par_iter();
-            cells.map(|_| AtomicU32::new(0)).collect()
-        };
-        Self((0..channels).map(|_| plane()).collect())
-    }
-
-    /// Stores cells and, with light and view exchanged, their reciprocal ones. Of two that are each other's, the
-    /// one whose light has the lower number serves for both.
-    fn store(&self, grid: Grid, channel: usize, cells: &Cells, values: &[f64]) {
-        let plane = &self.0[channel];
-        let first = [0, 2].map(|axis| cells.directions(axis, grid, 0));
-        let serves = |l: usize, v: usize| !cells.is_own || first[0][l] <= first[1][v];
-        let turns: &[usize] = match cells.is_turned {
-            true => &[0, grid.n_phi() / 2],
-            false => &[0],
-        };
-        for turn in turns {
-            let [lights, views] = [0, 2].map(|axis| cells.directions(axis, grid, *turn));
-            let put = |light: usize, view: usize, value: f64| {
-                plane[grid.cell(light, view)].store((value as f32).to_bits(), Relaxed);
-            };
-            for (l, light) in lights.iter().enumerate() {
-                for (v, view) in views.iter().enumerate() {
-                    if serves(l, v) {
-                        put(*light, *view, values[l * views.len() + v]);
-                    }
-                }
-            }
-            for (v, view) in views.iter().enumerate() {
-                for (l, light) in lights.iter().enumerate() {
-                    if serves(l, v) {
-                        put(*view, *light, values[l * views.len() + v]);
-                    }
-                }
-            }
-        }
-    }
-
-    /// All three planes: of one channel, that one in each.
-    fn into_planes(self, grid: Grid) -> [Vec<f32>; 3] {
-        let mut planes = self.0.into_iter().map(|plane| {
-            let bits = plane.into_iter().map(AtomicU32::into_inner);
-            let mut plane: Vec<f32> = bits.map(f32::from_bits).collect();
-            spread_poles(grid, &mut plane);
-            plane
-        });
-        let first = planes.next().unwrap_or_default();
-        match (planes.next(), planes.next()) {
-            (Some(second), Some(third)) => [first, second, third],
-            _ => [first.clone(), first.clone(), first],
-        }
-    }
-}
 
 /// The systems of some cells: of their places, and where data contradict reciprocity, of the reciprocal ones.
 struct Systems {
@@ -125,6 +64,7 @@ impl Systems {
 /// Cells that share systems, and what holds for all of them.
 struct Shares<'a> {
     systems: &'a Systems,
+    pair: &'a Cells,
     cells: Cells,
     /// What logarithms may be off by.
     tolerance: f64,
@@ -138,15 +78,16 @@ struct Memory {
     work: Work,
     values: Vec<f64>,
     relative: Vec<f64>,
+    /// Values and errors of the pair of patches that is worked on.
+    block: Block,
+    errors: Block,
 }
 
 struct Filler<'a> {
     fit: &'a ScatteredFit,
     grid: Grid,
     channels: usize,
-    values: Shared,
-    /// Standard errors, where wanted.
-    errors: Option<Shared>,
+    with_errors: bool,
     /// The system of all data, where they are few.
     one: Option<Systems>,
     arch: Arch,
@@ -159,8 +100,10 @@ struct Lines {
     middle: [f64; 3],
     /// First and last along each axis, where that is longer than its nodes.
     ends: [[[f64; 3]; 2]; 4],
-    /// How far logarithms are from quadratic, axis by axis.
+    /// How far logarithms are from quadratic, axis by axis, up to the one with which that is too far.
     bends: [f64; 4],
+    /// Whether they are near enough.
+    are_quadratic: bool,
 }
 
 impl ScatteredFit {
@@ -179,8 +122,7 @@ impl ScatteredFit {
             fit: self,
             grid,
             channels,
-            values: Shared::new(grid, channels),
-            errors: with_errors.then(|| Shared::new(grid, channels)),
+            with_errors,
             one: None,
             arch: Arch::new(),
             angles: (0..=(PARTS as usize * grid.n_phi()))
@@ -197,17 +139,26 @@ impl ScatteredFit {
             let near = filler.near(place, self.places.images());
             filler.one = filler.systems(&near);
         }
+        let mut values = planes_of(grid, channels);
+        let mut errors = planes_of(grid, if with_errors { channels } else { 0 });
+        let rows = Rows::of(grid, &mut values);
+        let rows_of_errors = Rows::of(grid, &mut errors);
         pairs(grid, self.choice.settings.symmetry)
             .par_iter()
             .with_max_len(8)
-            .for_each_init(Memory::default, |memory, cells| {
-                filler.fill(*cells, f64::INFINITY, memory)
+            .for_each_init(Memory::default, |memory, pair| {
+                memory.block.clear(pair, channels);
+                if with_errors {
+                    memory.errors.clear(pair, channels);
+                }
+                filler.fill(pair, *pair, f64::INFINITY, memory);
+                memory.block.store(pair, grid, &rows);
+                if with_errors {
+                    memory.errors.store(pair, grid, &rows_of_errors);
+                }
             });
-        let errors = filler.errors.map(|errors| errors.into_planes(grid));
-        (
-            DenseBrdf::from_planes(grid, filler.values.into_planes(grid)),
-            errors,
-        )
+        let errors = with_errors.then(|| three(grid, errors));
+        (DenseBrdf::from_planes(grid, three(grid, values)), errors)
     }
 }
 
@@ -311,7 +262,7 @@ impl Filler<'_> {
 
     /// Fills cells: by one system where they are small against its neighbourhood, else half by half.
     /// `around` is the radius around those that they are half of.
-    fn fill(&self, cells: Cells, around: f64, memory: &mut Memory) {
+    fn fill(&self, pair: &Cells, cells: Cells, around: f64, memory: &mut Memory) {
         let number = |row: usize, column: usize| row * self.grid.n_phi() + column;
         let first_light = number(cells.start[0], cells.start[1]);
         if cells.is_own && first_light > number(cells.end[2] - 1, cells.end[3] - 1) {
@@ -319,7 +270,7 @@ impl Filler<'_> {
             return;
         }
         if let Some(one) = &self.one {
-            return self.share(one, cells, memory);
+            return self.share(one, pair, cells, memory);
         }
         let middle = self.place(cells.middle());
         let reach = (0..16)
@@ -328,7 +279,7 @@ impl Filler<'_> {
             .sqrt();
         let halve = |radius: f64, memory: &mut Memory| {
             for half in cells.halves(self.longest(&cells)) {
-                self.fill(half, radius, memory);
+                self.fill(pair, half, radius, memory);
             }
         };
         if cells.count() > 1 && reach > HALVED_AGAIN * SHARED * around {
@@ -338,47 +289,85 @@ impl Filler<'_> {
         if cells.count() > 1 && reach > SHARED * near.radius() {
             halve(near.radius(), memory);
         } else if let Some(systems) = self.systems(&near) {
-            self.share(&systems, cells, memory);
+            self.share(&systems, pair, cells, memory);
         }
+    }
+
+    /// The axes of more than two cells, that along which they reach farthest first.
+    fn by_length(&self, cells: &Cells) -> Vec<usize> {
+        let mut axes: Vec<usize> = (0..4).filter(|axis| cells.length(*axis) > 2).collect();
+        let length = |axis: &usize| self.reach(cells, *axis);
+        axes.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        axes
+    }
+
+    /// How far cells reach along an axis, steps of the grid.
+    fn reach(&self, cells: &Cells, axis: usize) -> f64 {
+        let steps = (cells.length(axis) - 1) as f64;
+        let theta = (cells.middle()[axis & 2] * self.grid.step_deg()).to_radians();
+        steps * if axis & 1 == 0 { 1.0 } else { theta.sine() }
     }
 
     /// The axis along which cells reach farthest.
     fn longest(&self, cells: &Cells) -> usize {
-        let middle = cells.middle();
-        let length = |axis: usize| {
-            let steps = cells.length(axis) - 1;
-            let theta = (middle[axis & 2] * self.grid.step_deg()).to_radians();
-            let per_step = if axis & 1 == 0 { 1.0 } else { theta.sine() };
-            steps as f64 * per_step
-        };
+        let length = |axis: usize| self.reach(cells, axis);
         let axes = (0..4).filter(|axis| cells.length(*axis) > 1);
         let longest = axes.max_by(|a, b| length(*a).total_cmp(&length(*b)));
         longest.unwrap_or(0)
     }
 
-    fn share(&self, systems: &Systems, cells: Cells, memory: &mut Memory) {
+    fn share(&self, systems: &Systems, pair: &Cells, cells: Cells, memory: &mut Memory) {
         let middle = systems.at(&self.place(cells.middle()), true, &mut memory.work);
         let relative = middle
             .relative
             .iter()
             .copied()
             .fold(f64::INFINITY, f64::min);
-        let mut errors = vec![Vec::new(); self.channels];
-        if self.errors.is_some() {
-            self.each_node(&cells, |place| {
-                let at = systems.at(&place, true, &mut memory.work);
-                for (errors, relative) in errors.iter_mut().zip(at.relative) {
-                    errors.push((self.fit.choice.error_factor * relative).natural_log());
-                }
-            });
-        }
+        let errors = match self.with_errors {
+            true => self.errors(systems, &cells, &mut memory.work),
+            false => vec![Vec::new(); self.channels],
+        };
         let shares = Shares {
             systems,
+            pair,
             cells,
             tolerance: (TOLERANCE * self.fit.choice.error_factor * relative).max(TOLERANCE_MIN),
             errors,
         };
         self.refine(&shares, cells, memory);
+    }
+
+    /// Logarithms of relative standard errors at all nodes of cells, channel by channel. Between the few that are computed
+    /// they stay within these.
+    fn errors(&self, systems: &Systems, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut logs = |place: Pair| {
+            let relative = systems.at(&place, true, work).relative;
+            let logs = relative.map(|r| (self.fit.choice.error_factor * r).natural_log());
+            low = [0, 1, 2].map(|c| low[c].min(logs[c]));
+            high = [0, 1, 2].map(|c| high[c].max(logs[c]));
+            logs
+        };
+        let mut nodes = if (0..4).all(|axis| cells.length(axis) > 2) {
+            let at = cells.middle();
+            let middle = logs(self.place(at));
+            let ends = [0, 1, 2, 3].map(|axis| {
+                [0.0, 1.0].map(|share| {
+                    let mut place = at;
+                    place[axis] = cells.at(axis, share);
+                    logs(self.place(place))
+                })
+            });
+            self.few_nodes(cells, (middle, ends), &mut logs)
+        } else {
+            self.all_nodes(cells, &mut logs)
+        };
+        for (c, nodes) in nodes.iter_mut().enumerate() {
+            for log in nodes {
+                *log = log.clamp(low[c], high[c]);
+            }
+        }
+        nodes
     }
 
     /// The places of the nodes of a box, those of the last axis next to each other.
@@ -418,7 +407,7 @@ impl Filler<'_> {
         }
         let lines = self.lines(shares, &part, &mut memory.work);
         let bends = lines.bends;
-        if bends.iter().sum::<f64>() <= shares.tolerance {
+        if lines.are_quadratic {
             let mut nodes = self.nodes(shares, &part, &lines, &mut memory.work);
             if self.meets_between(shares, &part, &nodes, &mut memory.work) {
                 for values in &mut nodes {
@@ -452,23 +441,38 @@ impl Filler<'_> {
         lines: &Lines,
         work: &mut Work,
     ) -> Vec<Vec<f64>> {
+        let mut logs = |place: Pair| shares.systems.logs_at(&place, work);
         if (0..4).all(|axis| part.length(axis) > 2) {
-            let corners: [[f64; 3]; 16] = std::array::from_fn(|bits| {
-                let place = self.place(part.corner(bits));
-                shares.systems.logs_at(&place, work)
-            });
-            let few = |c: usize| Few {
-                middle: lines.middle[c],
-                ends: lines.ends.map(|ends| ends.map(|end| end[c])),
-                corners: corners.map(|corner| corner[c]),
-            };
-            return (0..self.channels).map(|c| few(c).all()).collect();
+            self.few_nodes(part, (lines.middle, lines.ends), &mut logs)
+        } else {
+            self.all_nodes(part, &mut logs)
         }
+    }
+
+    /// Values at all nodes of cells of more than two along each axis, by those in the middle, at the ends of the lines
+    /// through it, and at the corners.
+    fn few_nodes(
+        &self,
+        cells: &Cells,
+        (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
+        at: &mut impl FnMut(Pair) -> [f64; 3],
+    ) -> Vec<Vec<f64>> {
+        let corners: [[f64; 3]; 16] =
+            std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
+        let few = |c: usize| Few {
+            middle: middle[c],
+            ends: ends.map(|ends| ends.map(|end| end[c])),
+            corners: corners.map(|corner| corner[c]),
+        };
+        (0..self.channels).map(|c| few(c).all()).collect()
+    }
+
+    /// Values at all nodes of cells, each computed.
+    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; 3]) -> Vec<Vec<f64>> {
         let mut nodes = vec![Vec::new(); self.channels];
-        self.each_node(part, |place| {
-            let logs = shares.systems.logs_at(&place, work);
-            for (nodes, log) in nodes.iter_mut().zip(logs) {
-                nodes.push(log);
+        self.each_node(cells, |place| {
+            for (nodes, value) in nodes.iter_mut().zip(at(place)) {
+                nodes.push(value);
             }
         });
         nodes
@@ -480,8 +484,9 @@ impl Filler<'_> {
         let middle = logs(at);
         let mut ends = [[middle; 2]; 4];
         let mut bends = [0.0; 4];
-        // Two cells are nodes themselves, and so are three.
-        for axis in (0..4).filter(|axis| part.length(*axis) > 2) {
+        let mut are_quadratic = true;
+        // Two cells are nodes themselves, and so are three. Where parts reach far they bend most.
+        for axis in self.by_length(part) {
             let mut along = |share: f64| {
                 let mut place = at;
                 place[axis] = part.at(axis, share);
@@ -499,10 +504,15 @@ impl Filler<'_> {
                     bends[axis] = (found[c] - between).abs().max(bends[axis]);
                 }
             }
+            are_quadratic = bends.iter().sum::<f64>() <= shares.tolerance;
+            if !are_quadratic {
+                break;
+            }
         }
         Lines {
             middle,
             ends,
+            are_quadratic,
             bends,
         }
     }
@@ -543,10 +553,10 @@ impl Filler<'_> {
 
     fn store(&self, shares: &Shares<'_>, part: Cells, channels: &[Vec<f64>], memory: &mut Memory) {
         for (c, values) in channels.iter().enumerate() {
-            self.values.store(self.grid, c, &part, values);
-            let Some(planes) = &self.errors else {
+            memory.block.put(shares.pair, &part, c, values);
+            if !self.with_errors {
                 continue;
-            };
+            }
             memory.relative.clear();
             let between = Nodes {
                 cells: &shares.cells,
@@ -557,7 +567,8 @@ impl Filler<'_> {
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;
             }
-            planes.store(self.grid, c, &part, &memory.relative);
+            let errors = &mut memory.errors;
+            errors.put(shares.pair, &part, c, &memory.relative);
         }
     }
 }

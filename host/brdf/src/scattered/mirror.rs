@@ -24,6 +24,8 @@ const NEAREST: usize = 3;
 const MEASURED: f64 = 1.5;
 /// … and a plane is compared with others where so large a share of places is.
 const COMPARED: f64 = 0.5;
+/// So many neighbours predict while planes are compared that lie far apart.
+const COARSE: usize = 32;
 /// The golden section.
 const GOLDEN: f64 = 0.618_034;
 
@@ -132,7 +134,8 @@ pub(super) fn half_turn_is_measured(data: &Data, settings: Settings) -> bool {
 
 /// Looks for the plane.
 pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
-    let images = Images::new(data, settings);
+    let mut images = Images::new(data, settings);
+    images.settings.neighbours = settings.neighbours.min(COARSE);
     let planes = (180.0 / STEP_DEG) as usize;
     let all: Vec<Option<Vec<Found>>> = (0..planes)
         .map(|k| images.beyond(k as f64 * STEP_DEG))
@@ -162,6 +165,7 @@ pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
         };
     };
     let around = best as f64 * STEP_DEG;
+    images.settings.neighbours = settings.neighbours;
     let at = |azimuth_deg: f64| level(&images.beyond(azimuth_deg));
     let azimuth_deg = least(at, around - STEP_DEG, around + STEP_DEG, NEAR_DEG);
     Mirror {

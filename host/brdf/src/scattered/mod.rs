@@ -8,14 +8,18 @@
 mod cells;
 mod choose;
 mod data;
+mod left_out;
 mod local;
 mod merge;
 mod mirror;
 mod nugget;
 mod places;
+mod planes;
 mod quadratic;
 mod residual;
 mod table;
+mod trial;
+mod tune;
 mod wide;
 
 pub use choose::{Choice, Reason};

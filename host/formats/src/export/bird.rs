@@ -12,6 +12,7 @@ use gonia_brdf::direction::wrap_deg;
 use gonia_brdf::{Direction, Sample};
 use gonia_rig::{Channels, DenseChannels, Remark, Scale};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How it is exported.
@@ -63,14 +64,15 @@ fn write(
     errors: Option<&DenseChannels>,
     rings: usize,
 ) -> Result<Vec<Remark>, FileError> {
-    let points = points(dense, errors, rings);
-    let text = json!({ "metadata": metadata(dense, errors.is_some()), "data": data(dense, &points, errors.is_some()) });
-    write_whole_bytes(path, text.to_string().as_bytes())?;
-    let mut remarks = vec![Remark::new(
-        path.display(),
-        "who measured, where and when is not stated: gonia does not know it",
-        "write it into metadata (provenance, timestamp, sample)",
-    )];
+    let file = BirdFile {
+        channels: &dense.channels,
+        points: points(dense, errors, rings),
+        has_uncertainties: errors.is_some(),
+        provenance: &dense.provenance,
+        checksum: checksum::of_channels(dense),
+        what: "Nodes of a dense BRDF, interpolated from measured samples",
+    };
+    let mut remarks = file.write(path)?;
     if errors.is_none() {
         remarks.push(Remark::new(
             path.display(),
@@ -79,6 +81,40 @@ fn write(
         ));
     }
     Ok(remarks)
+}
+
+/// What such a file holds.
+pub struct BirdFile<'a> {
+    /// What the points' channels are.
+    pub channels: &'a Channels,
+    /// The values, in 1/sr. Those that are negative are left out.
+    pub points: Vec<Point>,
+    /// Whether all points have a standard uncertainty.
+    pub has_uncertainties: bool,
+    /// Where the data came from, by name.
+    pub provenance: &'a BTreeMap<String, String>,
+    /// Of the data that the points are of.
+    pub checksum: String,
+    /// What they are, for people.
+    pub what: &'a str,
+}
+
+impl BirdFile<'_> {
+    /// Writes it whole; what is to be said of it comes back.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(mut self, path: &Path) -> Result<Vec<Remark>, FileError> {
+        self.points
+            .retain(|p| p.value >= 0.0 && p.uncertainty.is_none_or(|u| u >= 0.0));
+        let text = json!({ "metadata": self.metadata(), "data": self.data() });
+        write_whole_bytes(path, text.to_string().as_bytes())?;
+        Ok(vec![Remark::new(
+            path.display(),
+            "who measured, where and when is not stated: gonia does not know it",
+            "write it into metadata (provenance, timestamp, sample)",
+        )])
+    }
 }
 
 /// The nodes nearest to rings of incidences, and nodes of views, in every channel.
@@ -124,42 +160,91 @@ fn points(dense: &DenseChannels, errors: Option<&DenseChannels>, rings: usize) -
             });
         }
     }
-    points.retain(|p| p.value >= 0.0 && p.uncertainty.is_none_or(|u| u >= 0.0));
     points
 }
 
-fn data(dense: &DenseChannels, points: &[Point], has_errors: bool) -> Value {
-    let array = |unit: &str, of: &dyn Fn(&Point) -> f64| {
-        let values: Vec<Value> = points.iter().map(|p| shortest(of(p))).collect();
-        json!({ "unit": unit, "values": values })
-    };
-    let mut data = Map::new();
-    let mut put = |name: &str, value: Value| data.insert(name.to_owned(), value);
-    put("theta_i", array("deg", &|p| p.light.theta_deg()));
-    put("phi_i", array("deg", &|p| wrap_deg(p.light.phi_deg())));
-    put("theta_r", array("deg", &|p| p.view.theta_deg()));
-    put("phi_r", array("deg", &|p| wrap_deg(p.view.phi_deg())));
-    put("BRDF", array("1/sr", &|p| p.value));
-    if has_errors {
-        let mut u = array("1/sr", &|p| p.uncertainty.unwrap_or(0.0));
-        u["comments"] = json!("combined standard uncertainty (k = 1)");
-        put("uBRDF", u);
-    }
-    match &dense.channels {
-        Channels::Single => {}
-        Channels::Bands(wavelengths) => {
-            let of = |p: &Point| wavelengths.get(p.channel).copied().unwrap_or(0.0);
-            put("wavelength_i", array("nm", &of));
-            put("wavelength_r", array("nm", &of));
+impl BirdFile<'_> {
+    fn data(&self) -> Value {
+        let array = |unit: &str, of: &dyn Fn(&Point) -> f64| {
+            let values: Vec<Value> = self.points.iter().map(|p| shortest(of(p))).collect();
+            json!({ "unit": unit, "values": values })
+        };
+        let mut data = Map::new();
+        let mut put = |name: &str, value: Value| data.insert(name.to_owned(), value);
+        put("theta_i", array("deg", &|p| p.light.theta_deg()));
+        put("phi_i", array("deg", &|p| wrap_deg(p.light.phi_deg())));
+        put("theta_r", array("deg", &|p| p.view.theta_deg()));
+        put("phi_r", array("deg", &|p| wrap_deg(p.view.phi_deg())));
+        put("BRDF", array("1/sr", &|p| p.value));
+        if self.has_uncertainties {
+            let mut u = array("1/sr", &|p| p.uncertainty.unwrap_or(0.0));
+            u["comments"] = json!("combined standard uncertainty (k = 1)");
+            put("uBRDF", u);
         }
-        Channels::Rgb => {
-            let mut channel = array("", &|p| p.channel as f64);
-            channel["description"] = json!("channel of linear sRGB: 0 red, 1 green, 2 blue");
-            channel["type"] = json!("number");
-            put("adhoc_variables", json!({ "channel": channel }));
+        match self.channels {
+            Channels::Single => {}
+            Channels::Bands(wavelengths) => {
+                let of = |p: &Point| wavelengths.get(p.channel).copied().unwrap_or(0.0);
+                put("wavelength_i", array("nm", &of));
+                put("wavelength_r", array("nm", &of));
+            }
+            Channels::Rgb => {
+                let mut channel = array("", &|p| p.channel as f64);
+                channel["description"] = json!("channel of linear sRGB: 0 red, 1 green, 2 blue");
+                channel["type"] = json!("number");
+                put("adhoc_variables", json!({ "channel": channel }));
+            }
         }
+        Value::Object(data)
     }
-    Value::Object(data)
+
+    fn metadata(&self) -> Value {
+        let said: Vec<String> = self
+            .provenance
+            .iter()
+            .map(|(k, v)| format!("{k}: {v}"))
+            .collect();
+        let material = self
+            .provenance
+            .get("material")
+            .map_or(UNKNOWN, String::as_str);
+        let kind = if self.has_uncertainties {
+            "with"
+        } else {
+            "without"
+        };
+        json!({
+            "schema": SCHEMA,
+            "id": format!("urn:gonia:{}", self.checksum),
+            "type": "BRDF",
+            "timestamp": "1970-01-01T00:00:00Z",
+            "description": format!("{}, {kind} standard uncertainties", self.what),
+            "method": "measurement",
+            "instrumentation": "NA",
+            "environment": "NA",
+            "software": { "name": "gonia", "comments": said.join("\n") },
+            "comments": "timestamp, provenance and the sample's size were not stated",
+            "provenance": {
+                "organization": UNKNOWN,
+                "email": "not.stated@example.invalid",
+                "contact_person": UNKNOWN,
+                "location": {
+                    "country": UNKNOWN,
+                    "city": UNKNOWN,
+                    "street": UNKNOWN,
+                    "building_nr": UNKNOWN,
+                    "postal_code": UNKNOWN,
+                },
+            },
+            "sample": {
+                "name": material,
+                "type": UNKNOWN,
+                "shape": "flat",
+                "dimensions": {},
+                "zero_azimuth_location": "the sample's x axis; azimuths are anticlockwise, seen from above",
+            },
+        })
+    }
 }
 
 /// A number in the fewest digits that single precision keeps.
@@ -167,50 +252,6 @@ fn shortest(value: f64) -> Value {
     let text = (value as f32).to_string();
     text.parse::<f64>()
         .map_or(Value::Null, |value| json!(value))
-}
-
-fn metadata(dense: &DenseChannels, has_errors: bool) -> Value {
-    let said: Vec<String> = dense
-        .provenance
-        .iter()
-        .map(|(k, v)| format!("{k}: {v}"))
-        .collect();
-    let material = dense
-        .provenance
-        .get("material")
-        .map_or(UNKNOWN, String::as_str);
-    let kind = if has_errors { "with" } else { "without" };
-    json!({
-        "schema": SCHEMA,
-        "id": format!("urn:gonia:{}", checksum::of_channels(dense)),
-        "type": "BRDF",
-        "timestamp": "1970-01-01T00:00:00Z",
-        "description": format!("Nodes of a dense BRDF, interpolated from measured samples, {kind} standard uncertainties"),
-        "method": "measurement",
-        "instrumentation": "NA",
-        "environment": "NA",
-        "software": { "name": "gonia", "comments": said.join("\n") },
-        "comments": "timestamp, provenance and the sample's size were not stated",
-        "provenance": {
-            "organization": UNKNOWN,
-            "email": "not.stated@example.invalid",
-            "contact_person": UNKNOWN,
-            "location": {
-                "country": UNKNOWN,
-                "city": UNKNOWN,
-                "street": UNKNOWN,
-                "building_nr": UNKNOWN,
-                "postal_code": UNKNOWN,
-            },
-        },
-        "sample": {
-            "name": material,
-            "type": UNKNOWN,
-            "shape": "flat",
-            "dimensions": {},
-            "zero_azimuth_location": "the sample's x axis; azimuths are anticlockwise, seen from above",
-        },
-    })
 }
 
 /// Reads such a file: its points in their order.

@@ -29,11 +29,18 @@ pub struct ExportFormat {
     pub is_folder: bool,
     /// What its size can be chosen by; `None` where it has one size.
     pub resolution: Option<Resolution>,
-    /// About how far its directions lie apart, degrees, at a resolution: a table that is twice as coarse makes a
+    /// About how far its directions lie apart, degrees, at a resolution: a table that is more than twice as coarse makes a
     /// file that looks finer than its data. Zero where its directions are the table's.
     pub step_deg: fn(usize) -> f64,
     /// How it is written, and read back.
     pub how: How,
+}
+
+impl ExportFormat {
+    /// Whether it has a place for standard uncertainties.
+    pub fn holds_uncertainties(&self) -> bool {
+        matches!(self.how, How::Points { .. } | How::Table { .. })
+    }
 }
 
 /// What the values of a format are.

@@ -20,6 +20,7 @@ pub(crate) mod zarr_read;
 mod zarr_rings;
 pub(crate) mod zemax;
 
+pub use bird::BirdFile;
 pub(crate) use dataset::{channels_of, scale_of};
 pub use folder::check_new_folder;
 pub use format::{ExportFormat, ExportSettings, Holds, How, Meaning, Point, Resolution};

@@ -1,5 +1,5 @@
-//! Bins as bytes, all little-endian: `GBN1`; the number of channels and of polar angles (u32); how many samples are
-//! outside (u64); the variance of a sample's logarithm (f32; NaN where it is unknown); and of each bin cell, count and
+//! Bins as bytes, all little-endian: `GBN2`; the number of channels and of polar angles (u32); how many samples are
+//! outside (u64); the variance of a sample's logarithm (f32; NaN where it is unknown); and of each bin cell (u64), count and
 //! frame (u32), then medians, deviations, and the mean directions of light and view (f32).
 
 use super::bytes::Bytes;
@@ -8,7 +8,7 @@ use gonia_brdf::{Bin, Bins, Grid};
 use std::io::Write;
 use std::path::Path;
 
-const MAGIC: &[u8; 4] = b"GBN1";
+const MAGIC: &[u8; 4] = b"GBN2";
 
 /// Writes bins.
 ///
@@ -24,7 +24,8 @@ pub fn write_bins<const N: usize>(path: &Path, bins: &Bins<N>) -> Result<(), Fil
         let variance = bins.noise_variance().unwrap_or(f32::NAN);
         out.write_all(&variance.to_le_bytes())?;
         for bin in bins.bins() {
-            for word in [bin.cell, bin.count, bin.frame] {
+            out.write_all(&bin.cell.to_le_bytes())?;
+            for word in [bin.count, bin.frame] {
                 out.write_all(&word.to_le_bytes())?;
             }
             let places = bin.light.iter().chain(&bin.view);
@@ -58,10 +59,10 @@ fn bins_of<const N: usize>(bytes: &mut Bytes<'_>, grid: Grid) -> Option<Bins<N>>
     }
     let outside = bytes.count()?;
     let [variance] = bytes.floats()?;
-    let mut bins = Vec::with_capacity(bytes.0.len() / (4 * (9 + 2 * N)));
+    let mut bins = Vec::with_capacity(bytes.0.len() / (4 * (10 + 2 * N)));
     while !bytes.0.is_empty() {
         bins.push(Bin {
-            cell: bytes.u32()?,
+            cell: bytes.count()? as u64,
             count: bytes.u32()?,
             frame: bytes.u32()?,
             median: bytes.floats()?,

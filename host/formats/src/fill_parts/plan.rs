@@ -42,9 +42,10 @@ struct Text {
 }
 
 /// The settings' names in the file.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 12] = [
     "block_deg",
     "tolerance",
+    "target_error",
     "budget",
     "neighbours",
     "one_bin_in",
@@ -66,6 +67,7 @@ impl FillPlan {
         let values = [
             s.block_deg.to_string(),
             s.tolerance.to_string(),
+            s.target_error.to_string(),
             s.budget.to_string(),
             s.neighbours.to_string(),
             s.one_bin_in.to_string(),
@@ -144,6 +146,7 @@ fn settings_of(text: &BTreeMap<String, String>) -> Option<FillSettings> {
     let settings = FillSettings {
         block_deg: number(text, "block_deg")?,
         tolerance: number(text, "tolerance")?,
+        target_error: number(text, "target_error")?,
         budget: number(text, "budget")?,
         neighbours: number(text, "neighbours")?,
         one_bin_in: number(text, "one_bin_in")?,

@@ -3,9 +3,10 @@
 //! For each direction of the light (P azimuths, T polar angles) f·cosθv stands on a square of R × R
 //! places. A place u of the half vector m is (√(2θm/π), (φm + π)/2π); the density `vndf` over u says where
 //! places lie close: s = its running integral at u, and f·cosθv = rgb(s)·ndf(u)/(4·sigma(u of the light)).
-//! Written here, vndf is 1 and sigma ¼, so that s = u and `rgb` is f·cosθv over `ndf`, a shape that all lights share. `luminance` is
-//! the density over s by which a renderer chooses directions.
+//! Written here, sigma is ¼, so that `rgb` is f·cosθv over `ndf`, a shape that all lights share or 1, and vndf is 1 (s = u) or
+//! densest where the values bend most. `luminance` is the density over s by which a renderer chooses directions.
 
+mod density;
 mod read;
 mod shape;
 mod tensor_file;
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shape_of_all_lights_makes_a_small_file_of_a_sharp_material_nearer() {
+    fn a_shape_and_places_by_curvature_make_a_small_file_nearer() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("sharp.bsdf");
         let table = |step_deg, sharpness| DenseFile {
@@ -125,10 +126,11 @@ mod tests {
         for (file, model, side, gains) in [
             (&sharp, None, 12, [0.8, 0.8]),
             (&sharp, None, 16, [0.8, 0.9]),
-            (&soft, None, 16, [1.0, 1.0]),
-            (&soft, Some(&function), 16, [1.0, 1.0]),
+            (&soft, None, 16, [1.05, 0.75]),
+            (&soft, Some(&function), 16, [1.05, 0.9]),
         ] {
-            write::write_with(&path, file, side, &shape::Shape::flat()).unwrap();
+            let even = write::Material::new(file, side, &shape::Shape::flat(), true).unwrap();
+            even.write(&path).unwrap();
             let flat = errors(&path, file, model);
             let settings = ExportSettings {
                 resolution: side,

@@ -47,10 +47,21 @@ impl Table {
 /// # Errors
 /// When it is cut short, spectral, or its fields do not fit each other.
 pub fn read(path: &Path) -> Result<Rgl, FileError> {
-    let fields = Fields {
-        path,
-        fields: read_tensor_file(path)?,
-    };
+    Rgl::of(path, &read_tensor_file(path)?)
+}
+
+impl Rgl {
+    /// Of a file's fields; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn of(path: &Path, fields: &BTreeMap<String, Field>) -> Result<Self, FileError> {
+        material(&Fields { path, fields })
+    }
+}
+
+fn material(fields: &Fields<'_>) -> Result<Rgl, FileError> {
+    let path = fields.path;
     if fields.fields.contains_key("spectra") && !fields.fields.contains_key("rgb") {
         return Err(FileError::new(
             path,
@@ -105,7 +116,7 @@ pub fn read(path: &Path) -> Result<Rgl, FileError> {
 /// The fields of a file.
 struct Fields<'a> {
     path: &'a Path,
-    fields: BTreeMap<String, Field>,
+    fields: &'a BTreeMap<String, Field>,
 }
 
 impl Fields<'_> {

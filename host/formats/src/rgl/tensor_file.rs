@@ -111,15 +111,16 @@ fn size_of_kind(kind: u8) -> Option<usize> {
     })
 }
 
-/// Writes fields whole, in their order.
+/// Writes fields whole, in the order of their names.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_tensor_file(path: &Path, fields: &[(&str, Field)]) -> Result<(), FileError> {
-    let head = |(name, field): &(&str, Field)| 2 + name.len() + 2 + 1 + 8 + 8 * field.shape.len();
+pub fn write_tensor_file(path: &Path, fields: &BTreeMap<String, Field>) -> Result<(), FileError> {
+    let head =
+        |(name, field): (&String, &Field)| 2 + name.len() + 2 + 1 + 8 + 8 * field.shape.len();
     let mut offset = MAGIC.len() + 2 + 4 + fields.iter().map(head).sum::<usize>();
     let mut offsets = Vec::new();
-    for (_, field) in fields {
+    for field in fields.values() {
         offset = offset.next_multiple_of(ALIGNED);
         offsets.push(offset);
         offset += match &field.data {
@@ -199,19 +200,13 @@ mod tests {
     fn fields_come_back_and_cut_files_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.bsdf");
-        let fields = [
-            ("description", Field::of_bytes(b"velvet")),
-            (
-                "rgb",
-                Field::of_floats(&[2, 1, 3], (0..6).map(|k| k as f32).collect()),
-            ),
-        ];
+        let floats = (0..6).map(|k| k as f32).collect();
+        let fields = BTreeMap::from([
+            ("description".to_owned(), Field::of_bytes(b"velvet")),
+            ("rgb".to_owned(), Field::of_floats(&[2, 1, 3], floats)),
+        ]);
         write_tensor_file(&path, &fields).unwrap();
-        let read = read_tensor_file(&path).unwrap();
-        assert_eq!(read.len(), 2);
-        for (name, field) in fields {
-            assert_eq!(read[name], field);
-        }
+        assert_eq!(read_tensor_file(&path).unwrap(), fields);
         let bytes = std::fs::read(&path).unwrap();
         for length in 0..bytes.len() {
             assert_eq!(fields_of(&bytes[..length]), None, "{length}");

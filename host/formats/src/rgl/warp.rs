@@ -91,6 +91,37 @@ impl Densities {
         [first.clamp(0.0, 1.0), second.clamp(0.0, 1.0)]
     }
 
+    /// The place that [`Self::to_uniform`] takes to `uniform`, of one slice.
+    pub fn place_of(&self, uniform: [f64; 2], slice: usize) -> [f64; 2] {
+        let [width, height] = self.size;
+        let across = &self.across[slice * height..][..height];
+        let wanted = uniform[1].clamp(0.0, 1.0) * across[height - 1];
+        let y = across[1..height - 1].partition_point(|sum| *sum <= wanted);
+        let row = |dy: usize| (slice * height + y + dy) * width;
+        let total = |dy| self.along[row(dy) + width - 1];
+        let v = part_of_cell(total(0), total(1), wanted - across[y]);
+        let mixed = |of: &dyn Fn(usize) -> f64| of(row(0)) + v * (of(row(1)) - of(row(0)));
+        let start = |x: usize| mixed(&|row| self.along[row + x]);
+        let wanted = uniform[0].clamp(0.0, 1.0) * start(width - 1);
+        let x = (1..width - 1).take_while(|x| start(*x) <= wanted).count();
+        let node = |x: usize| mixed(&|row| f64::from(self.values[row + x]));
+        let u = part_of_cell(node(x), node(x + 1), wanted - start(x));
+        [
+            (x as f64 + u) / (width - 1) as f64,
+            (y as f64 + v) / (height - 1) as f64,
+        ]
+    }
+
+    /// The density at a place of the unit square, of slices mixed.
+    pub fn at(&self, place: [f64; 2], shares: &[Share]) -> f64 {
+        let ([x, y], [u, v]) = self.cell(place);
+        let row = |dy: usize| {
+            let [a, b] = [0, 1].map(|dx| self.mixed(&self.values, [x + dx, y + dy], shares));
+            a + u * (b - a)
+        };
+        row(0) + v * (row(1) - row(0))
+    }
+
     /// The cell of a place, and where in it.
     fn cell(&self, place: [f64; 2]) -> ([usize; 2], [f64; 2]) {
         cell(self.size, place)
@@ -108,6 +139,13 @@ impl Densities {
         let value = |(slice, share): &Share| share * values[(slice * height + y) * width + x];
         shares.iter().map(value).sum()
     }
+}
+
+/// How far into a cell, whose density goes from `a` to `b`, its integral comes to `wanted`.
+fn part_of_cell(a: f64, b: f64, wanted: f64) -> f64 {
+    // The root of a·u + (b − a)·u²/2 = wanted, in the form that holds with b = a, too.
+    let root = (a * a + 2.0 * (b - a) * wanted).max(0.0).sqrt();
+    (2.0 * wanted / (a + root).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
 /// The cell of a lattice in which a place of the unit square lies, and where in the cell.
@@ -137,18 +175,6 @@ pub fn place_of_phi(x: f64, y: f64) -> f64 {
 mod tests {
     use super::*;
 
-    impl Densities {
-        /// The density at a place of the unit square, of slices mixed.
-        pub fn at(&self, place: [f64; 2], shares: &[Share]) -> f64 {
-            let ([x, y], [u, v]) = self.cell(place);
-            let row = |dy: usize| {
-                let [a, b] = [0, 1].map(|dx| self.mixed(&self.values, [x + dx, y + dy], shares));
-                a + u * (b - a)
-            };
-            row(0) + v * (row(1) - row(0))
-        }
-    }
-
     #[test]
     fn the_density_is_how_the_uniform_square_is_stretched() {
         let values: Vec<f32> = (0..24).map(|k| 1.0 + ((k * 5) % 7) as f32).collect();
@@ -164,6 +190,21 @@ mod tests {
             assert!((area / (step * step) / density - 1.0).abs() < 1e-3);
         }
         assert_eq!(densities.to_uniform([1.0, 1.0], &shares), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_place_goes_there_and_back() {
+        let values: Vec<f32> = (0..24).map(|k| ((k * 5) % 7) as f32).collect();
+        let densities = Densities::new([4, 3], values).unwrap();
+        for slice in 0..2 {
+            for place in [[0.0, 0.0], [0.2, 0.3], [0.5, 0.8], [0.9, 0.1], [1.0, 1.0]] {
+                let there = densities.to_uniform(place, &[(slice, 1.0)]);
+                let back = densities.place_of(there, slice);
+                for (a, b) in place.iter().zip(back) {
+                    assert!((a - b).abs() < 1e-7, "{place:?} {back:?}");
+                }
+            }
+        }
     }
 
     #[test]

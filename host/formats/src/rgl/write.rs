@@ -1,14 +1,17 @@
 //! Writing an RGL file.
 
+use super::density::Density;
+use super::read::Rgl;
 use super::shape::{Shape, half_vector, mean};
 use super::tensor_file::{Field, write_tensor_file};
-use super::warp::{cell, theta_of_place};
+use super::warp::{Densities, theta_of_place};
 use crate::FileError;
 use crate::export::format::ExportSettings;
 use gonia_brdf::direction::{Vec3, dot};
-use gonia_brdf::{DenseBrdf, Direction, Elementary};
+use gonia_brdf::{Brdf, DenseBrdf, Direction, Elementary};
 use gonia_rig::DenseFile;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -19,51 +22,71 @@ const THETA_STEP_DEG: f64 = 4.0;
 /// Least density of the directions that a renderer chooses, of a mean of one: it may come to any.
 const LEAST_CHOSEN: f64 = 0.05;
 
-/// Writes a dense BRDF whole, with `settings.resolution`² places of the half vector to a direction of the
-/// light.
+/// Writes a dense BRDF whole, with `settings.resolution`² places of the half vector to a direction of the light. Of a
+/// file with and without a shape, with places evenly and by curvature, the one is written that a reader finds
+/// nearest to the table.
 ///
 /// # Errors
 /// When the file cannot be written.
 pub fn write(path: &Path, file: &DenseFile, settings: &ExportSettings) -> Result<(), FileError> {
-    let (side, flat) = (settings.resolution, Shape::flat());
-    if side > SMALL {
-        return write_with(path, file, side, &flat);
+    let side = settings.resolution;
+    let shapes = [Shape::flat(), Shape::of(&file.brdf, side)];
+    let mut nearest: Option<(f64, Material)> = None;
+    for shape in &shapes {
+        for is_even in [true, false] {
+            let Some(material) = Material::new(file, side, shape, is_even) else {
+                continue;
+            };
+            let error = material.error(&file.brdf);
+            if nearest.as_ref().is_none_or(|(least, _)| error < *least) {
+                nearest = Some((error, material));
+            }
+        }
     }
-    let shape = Shape::of(&file.brdf, side);
-    let error = |shape: &Shape| error_between(&file.brdf, side, shape);
-    let is_nearer = error(&shape) < error(&flat);
-    write_with(path, file, side, if is_nearer { &shape } else { &flat })
+    let (_, material) = nearest.ok_or_else(|| {
+        let problem = "cannot be written: the BRDF has values that are no numbers";
+        FileError::new(path, problem, "fill it again")
+    })?;
+    material.write(path)
 }
 
-/// As [`write`], with a shape that is taken out of the values.
-pub(super) fn write_with(
-    path: &Path,
-    file: &DenseFile,
-    side: usize,
-    shape: &Shape,
-) -> Result<(), FileError> {
-    let theta_i = polar_angles(&file.brdf);
-    let phi_i: Vec<f64> = (0..AZIMUTHS)
-        .map(|k| TAU * k as f64 / (AZIMUTHS - 1) as f64 - PI)
-        .collect();
-    let lights: Vec<Direction> = phi_i
-        .iter()
-        .flat_map(|phi| theta_i.iter().map(|theta| direction(*theta, *phi)))
-        .collect();
-    let slices: Vec<Slice> = lights
-        .par_iter()
-        .map(|light| Slice::new(&file.brdf, *light, side, shape))
-        .collect();
-    let gather =
-        |of: fn(&Slice) -> &[f32]| -> Vec<f32> { slices.iter().flat_map(of).copied().collect() };
-    let (p, t) = (phi_i.len(), theta_i.len());
-    let floats = |shape: &[usize], of| Field::of_floats(shape, gather(of));
-    let narrow = |angles: &[f64]| {
-        Field::of_floats(&[angles.len()], angles.iter().map(|a| *a as f32).collect())
-    };
-    write_tensor_file(
-        path,
-        &[
+/// The fields of a file.
+pub(super) struct Material(BTreeMap<String, Field>);
+
+impl Material {
+    /// Of a table, with a shape that is taken out of the values, and places that lie evenly or by curvature. `None` of
+    /// values that are no numbers.
+    pub(super) fn new(file: &DenseFile, side: usize, shape: &Shape, is_even: bool) -> Option<Self> {
+        let theta_i = polar_angles(&file.brdf);
+        let phi_i: Vec<f64> = (0..AZIMUTHS)
+            .map(|k| TAU * k as f64 / (AZIMUTHS - 1) as f64 - PI)
+            .collect();
+        let lights: Vec<Vec3> = phi_i
+            .iter()
+            .flat_map(|phi| theta_i.iter().map(|theta| direction(*theta, *phi)))
+            .map(Direction::to_vec3)
+            .collect();
+        let density = if is_even {
+            Density::even(lights.len())
+        } else {
+            Density::by_curvature(&lights, |light, place| {
+                mean(seen(&file.brdf, light, place)) / shape.at(place)
+            })
+        }?;
+        let slices: Vec<Slice> = lights
+            .par_iter()
+            .enumerate()
+            .map(|(k, light)| Slice::new(&file.brdf, *light, side, shape, (density.map(), k)))
+            .collect();
+        let gather = |of: fn(&Slice) -> &[f32]| -> Vec<f32> {
+            slices.iter().flat_map(of).copied().collect()
+        };
+        let (p, t) = (phi_i.len(), theta_i.len());
+        let narrow = |angles: &[f64]| {
+            Field::of_floats(&[angles.len()], angles.iter().map(|a| *a as f32).collect())
+        };
+        let nodes = density.side();
+        let fields = [
             ("description", Field::of_bytes(description(file).as_bytes())),
             ("jacobian", Field::of_bytes(&[1])),
             ("phi_i", narrow(&phi_i)),
@@ -73,60 +96,63 @@ pub(super) fn write_with(
                 Field::of_floats(&[shape.side(); 2], shape.values().to_vec()),
             ),
             ("sigma", Field::of_floats(&[2, 2], vec![0.25; 4])),
-            // Uniform: one by the material's brightness was tried, and is further from the table.
             (
                 "vndf",
-                Field::of_floats(&[p, t, 2, 2], vec![1.0; 4 * p * t]),
+                Field::of_floats(&[p, t, nodes, nodes], density.values().to_vec()),
             ),
             (
                 "luminance",
-                floats(&[p, t, side, side], |slice| &slice.chosen),
+                Field::of_floats(&[p, t, side, side], gather(|slice| &slice.chosen)),
             ),
-            ("rgb", floats(&[p, t, 3, side, side], |slice| &slice.rgb)),
-        ],
-    )
+            (
+                "rgb",
+                Field::of_floats(&[p, t, 3, side, side], gather(|slice| &slice.rgb)),
+            ),
+        ];
+        let fields = fields.map(|(name, field)| (name.to_owned(), field));
+        Some(Self(fields.into()))
+    }
+
+    /// Writes the file whole.
+    pub(super) fn write(&self, path: &Path) -> Result<(), FileError> {
+        write_tensor_file(path, &self.0)
+    }
+
+    /// RMS of ln of the values as a reader has them against the table's.
+    fn error(&self, brdf: &DenseBrdf) -> f64 {
+        let Ok(read) = Rgl::of(Path::new(""), &self.0) else {
+            return f64::INFINITY;
+        };
+        let of_pair = |k: usize| {
+            let [light, view] = pair(k);
+            let wanted = mean(brdf.lookup(light, view).map(f64::from));
+            let found = mean(read.eval(light.to_vec3(), view.to_vec3()));
+            (wanted > 0.0 && found > 0.0).then(|| (found / wanted).natural_log().powi(2))
+        };
+        let squares: Vec<f64> = (0..TRIED).into_par_iter().filter_map(of_pair).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    }
 }
 
-/// Up to so many places along a side a shape is taken out, where that is nearer to the table. With more places it gains
-/// on some materials and loses on others.
-const SMALL: usize = 24;
-/// Lights and places at which a shape is judged.
-const TRIED: [usize; 2] = [48, 192];
+/// Pairs of directions at which a file is judged.
+const TRIED: usize = 10_000;
+/// Their largest polar angle, degrees.
+const LAST_TRIED_DEG: f64 = 75.0;
+/// How far every other view is from the light's mirror direction at most, degrees.
+const NEAR_DEG: f64 = 6.0;
 
-/// RMS of ln of the values between the places, as a reader has them, against the table's, at some lights.
-fn error_between(brdf: &DenseBrdf, side: usize, shape: &Shape) -> f64 {
-    let [lights, places] = TRIED;
-    let squares = |k: usize| {
-        let angle = |by: f64| (k as f64 * by).fract();
-        let light = direction(
-            angle(0.618_034) * 75f64.to_radians(),
-            angle(0.754_878) * TAU,
-        );
-        let light = light.to_vec3();
-        let at = |place| mean(seen(brdf, light, place)) / shape.at(place);
-        let mut sum = [0.0; 2];
-        for j in 0..places {
-            // Half of them near the normal, where highlights are.
-            let u = (j as f64 * 0.569_840_3).fract() * if j % 2 == 0 { 1.0 } else { 0.4 };
-            let place = [u, (j as f64 * 0.438_579_1).fract()];
-            let ([x, y], [u, v]) = cell([side; 2], place);
-            let node = |i: usize| i as f64 / (side - 1) as f64;
-            let corner = |dx, dy| at([node(x + dx), node(y + dy)]);
-            let row = |dy| corner(0, dy) + u * (corner(1, dy) - corner(0, dy));
-            let read = (row(0) + v * (row(1) - row(0))) * shape.at(place);
-            let wanted = mean(seen(brdf, light, place));
-            if read > 0.0 && wanted > 0.0 {
-                sum[0] += (read / wanted).natural_log().powi(2);
-                sum[1] += 1.0;
-            }
-        }
-        sum
-    };
-    let sums: Vec<[f64; 2]> = (0..lights).into_par_iter().map(squares).collect();
-    let [squares, count] = sums
-        .iter()
-        .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-    (squares / count.max(1.0)).sqrt()
+/// A pair of directions, every other one near the mirror's direction.
+fn pair(k: usize) -> [Direction; 2] {
+    let part = |by: f64| (k as f64 * by).fract();
+    let any = |a, b| Direction::from_deg(part(a) * LAST_TRIED_DEG, part(b) * 360.0);
+    let light = any(0.618_034, 0.754_878);
+    if k.is_multiple_of(2) {
+        return [light, any(0.569_840_3, 0.438_579_1)];
+    }
+    let near = |by: f64| NEAR_DEG * (2.0 * part(by) - 1.0);
+    let theta = (light.theta_deg() + near(0.802_381_7)).abs();
+    let phi = light.phi_deg() + 180.0 + near(0.366_025_4);
+    [light, Direction::from_deg(theta, phi)]
 }
 
 /// Nodes of the light's polar angle, radians.
@@ -161,18 +187,25 @@ struct Slice {
 }
 
 impl Slice {
-    fn new(brdf: &DenseBrdf, light: Direction, side: usize, shape: &Shape) -> Self {
-        let towards = light.to_vec3();
+    fn new(
+        brdf: &DenseBrdf,
+        towards: Vec3,
+        side: usize,
+        shape: &Shape,
+        (map, slice): (&Densities, usize),
+    ) -> Self {
         let nodes = side * side;
         let mut rgb = vec![0.0; 3 * nodes];
         let mut chosen = vec![0.0; nodes];
         for k in 0..nodes {
-            let place = [k % side, k / side].map(|i| i as f64 / (side - 1) as f64);
+            let node = [k % side, k / side].map(|i| i as f64 / (side - 1) as f64);
+            let place = map.place_of(node, slice);
             let value = seen(brdf, towards, place);
             for c in 0..3 {
                 rgb[c * nodes + k] = (value[c] / shape.at(place)) as f32;
             }
-            chosen[k] = mean(value) * area_of_place(towards, place);
+            chosen[k] =
+                mean(value) * area_of_place(towards, place) / map.at(place, &[(slice, 1.0)]);
         }
         Self {
             rgb,

@@ -29,7 +29,9 @@ mod contribution;
 mod directions;
 mod equation;
 mod fits;
+mod poses;
 mod record;
+mod samples;
 mod summary;
 
 pub use albedo::{AlbedoUncertainty, albedo_uncertainty};
@@ -38,7 +40,10 @@ pub(crate) use cells::{PLACES, places, shape};
 pub use contribution::Contribution;
 pub use equation::{Effect, Effects, Equation, Part, Shape, Slant};
 pub(crate) use fits::shared_errors;
+pub(crate) use poses::fall_fact;
+pub use poses::{fall_in, with_poses};
 pub use record::budget_in;
+pub use samples::scale_uncertainty;
 pub use summary::{
     CellBudget, Holding, Shares, StratumBudget, coverage, not_stated, stated, summary,
 };

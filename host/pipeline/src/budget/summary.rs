@@ -110,7 +110,7 @@ impl<'a> CellBudget<'a> {
 }
 
 /// The combined standard uncertainty of such contributions, with one of them halved where it is named.
-fn combined(shares: &Shares, halved: Option<usize>) -> f64 {
+pub(super) fn combined(shares: &Shares, halved: Option<usize>) -> f64 {
     let square = |(place, share): (usize, &f64)| {
         let share = if Some(place) == halved {
             0.5 * share
@@ -199,7 +199,7 @@ pub fn coverage(
 
 /// Cells that stand for all that are positive and not extrapolated, by part of the domain; all of them come first,
 /// and parts without cells are left out.
-fn by_stratum(cells: &CellBudget<'_>) -> Vec<(Stratum, Vec<usize>)> {
+pub(super) fn by_stratum(cells: &CellBudget<'_>) -> Vec<(Stratum, Vec<usize>)> {
     let grid = cells.grid();
     // A step that shares no factor with the number of directions meets all of them.
     let step = (grid.n_cells() / TOLD_BY).max(1) | 1;
@@ -230,11 +230,7 @@ fn by_stratum(cells: &CellBudget<'_>) -> Vec<(Stratum, Vec<usize>)> {
 }
 
 fn of_stratum(stratum: Stratum, cells: &[Shares]) -> StratumBudget {
-    let median = |of: &dyn Fn(&Shares) -> f64| {
-        let mut all: Vec<f64> = cells.iter().map(of).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
-    };
+    let median = |of: &dyn Fn(&Shares) -> f64| median(cells.iter().map(of).collect());
     let mut budget = StratumBudget {
         stratum,
         combined: median(&|shares| combined(shares, None)),
@@ -246,6 +242,12 @@ fn of_stratum(stratum: Stratum, cells: &[Shares]) -> StratumBudget {
         budget.halved[place] = median(&|shares| combined(shares, Some(place)));
     }
     budget
+}
+
+/// The median of some numbers; 0 of none.
+pub(super) fn median(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// What a rig states of its inputs, for a table: the value with its unit, or nothing of a contribution that is none.

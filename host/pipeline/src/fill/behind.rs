@@ -60,7 +60,10 @@ impl Behind {
         };
         let read = read_channels_of_all(&samples, Some(dense.scale()))?;
         let mut remarks = read.remarks;
-        let (fit, said) = FitOfSamples::new(read.values, source.symmetry)?;
+        let (fit, said) = match (source.symmetry, source.plane) {
+            (Some(kind), Some(plane)) => FitOfSamples::about_plane(read.values, kind, plane)?,
+            (symmetry, _) => FitOfSamples::new(read.values, symmetry)?,
+        };
         remarks.extend(said);
         if fit.channels() != dense.channels() {
             return other(format!(

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::progress::{Progress, Step, step};
 use gonia_brdf::interpolate::{
-    self, AnyKernel, Calibration, Data, ErrorBars, FillSettings, NewBlock,
+    self, AnyKernel, Calibration, Data, ErrorBars, ErrorFall, FillSettings, NewBlock,
 };
 use gonia_brdf::{Bins, DenseBrdf};
 
@@ -14,6 +14,8 @@ pub struct FilledBins<const N: usize = 3> {
     pub dense: DenseBrdf<N>,
     /// Standard errors, where asked for.
     pub errors: Option<ErrorBars<N>>,
+    /// How these would fall with more frames, where they were asked for.
+    pub fall: Option<ErrorFall>,
     /// The settings, as chosen for the material.
     pub settings: FillSettings,
 }
@@ -56,24 +58,27 @@ where
         Start::Choose(base) => chosen(&known, base, progress)?,
         Start::Chosen(settings) => settings,
     };
-    let (dense, errors) = if with_errors {
-        let calibration = step(progress, Step::CalibratingErrorBars, |_| {
-            Calibration::new(&known, &settings).ok_or(Error::TooFewFrames)
+    let (dense, errors, fall) = if with_errors {
+        let (calibration, fall) = step(progress, Step::CalibratingErrorBars, |_| {
+            let calibration = Calibration::new(&known, &settings).ok_or(Error::TooFewFrames)?;
+            let fall = ErrorFall::measure(&known, &settings, &calibration);
+            Ok::<_, Error>((calibration, fall))
         })?;
         let (dense, errors) = step(progress, Step::Interpolating, |share| {
             interpolate::fill_with_errors(&known, &settings, &calibration, share)
                 .map_err(Error::from)
         })?;
-        (dense, Some(errors))
+        (dense, Some(errors), Some(fall))
     } else {
         let dense = step(progress, Step::Interpolating, |share| {
             interpolate::fill(&known, &settings, share).map_err(Error::from)
         })?;
-        (dense, None)
+        (dense, None, None)
     };
     Ok(FilledBins {
         dense,
         errors,
+        fall,
         settings,
     })
 }

@@ -6,7 +6,7 @@ use crate::budget::{Equation, PLACES, Part, Slant, places, shape};
 use crate::warnings;
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
-use gonia_brdf::{Direction, Elementary, SymmetryKind};
+use gonia_brdf::{Direction, Elementary, MirrorPlane, Sample, SymmetryKind};
 use gonia_rig::{Budget, Channels, Remark, SampleValues};
 
 /// More samples than this are not asked without a grid.
@@ -30,7 +30,29 @@ impl FitOfSamples {
         samples: impl Into<SampleValues>,
         symmetry: Option<SymmetryKind>,
     ) -> Result<(Self, Vec<Remark>), Error> {
-        let mut samples = samples.into();
+        Self::fitted(samples.into(), |samples| {
+            ScatteredFit::new(samples, symmetry)
+        })
+    }
+
+    /// The same about a plane of symmetry that is known.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn about_plane(
+        samples: impl Into<SampleValues>,
+        kind: SymmetryKind,
+        plane: MirrorPlane,
+    ) -> Result<(Self, Vec<Remark>), Error> {
+        Self::fitted(samples.into(), |samples| {
+            ScatteredFit::about_plane(samples, kind, plane)
+        })
+    }
+
+    fn fitted(
+        mut samples: SampleValues,
+        fit: impl Fn(&[Sample]) -> Option<ScatteredFit>,
+    ) -> Result<(Self, Vec<Remark>), Error> {
         let mut remarks = warnings::of_oddities(&samples.keep_sound());
         let n = samples.channels().count();
         let spread = samples.three(spread_over(n));
@@ -45,7 +67,7 @@ impl FitOfSamples {
             });
         }
         let too_few = FillError::TooFewBins(spread.len());
-        let fit = ScatteredFit::new(&spread, symmetry).ok_or(too_few)?;
+        let fit = fit(&spread).ok_or(too_few)?;
         let choice = fit.choice().clone();
         remarks.extend(warnings::remarks_on_symmetry(&fit));
         if choice.reason == Reason::Assumed {

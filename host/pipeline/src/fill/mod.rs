@@ -33,6 +33,7 @@ pub use parts::{Begun, FillInParts};
 pub use rows::fill_to_file;
 
 use crate::Error;
+use crate::budget;
 use crate::progress::{Progress, Step, step};
 use crate::warnings::{self, DirectionalAlbedo};
 use gonia_brdf::baselines;
@@ -83,7 +84,7 @@ pub struct Filled {
     /// Standard errors, where asked for.
     pub errors: Option<ChannelErrors>,
     /// Cells with a sample, by number ([`Grid::cell`](gonia_brdf::Grid::cell)).
-    pub cells: Vec<u32>,
+    pub cells: Vec<u64>,
     /// How it came about.
     pub account: FillAccount,
 }
@@ -155,11 +156,17 @@ pub fn fill(
             settings.to_string()
         }
     };
-    let provenance = prepared.provenance(&settings, options);
+    let mut provenance = prepared.provenance(&settings, options);
+    provenance.extend(planes.fall.as_ref().map(budget::fall_fact));
     let errors = options.with_errors.then(|| ChannelErrors {
         channels: channels.clone(),
         standard_error: planes.errors,
-        origin: Origins::of(&prepared.bins, prepared.fit.as_ref()).of_cells(),
+        origin: Origins::of(
+            &prepared.bins,
+            prepared.own.as_deref(),
+            prepared.fit.as_ref(),
+        )
+        .of_cells(),
     });
     let dense = DenseChannels {
         channels,

@@ -23,6 +23,8 @@ pub struct FillOptions {
     /// A block is refined where a finer one differs from it by more than this many times the noise
     /// of the samples, 0 ..= ∞; the preset's without it, or more where refining would cost too much.
     pub tolerance: Option<f32>,
+    /// And by more than this relative difference, whatever the noise, 0 ..= 1; the preset's without it.
+    pub target_error: Option<f32>,
     /// The kernel of the blocks: [`Matern32`], or one of your own.
     pub kernel: &'static dyn AnyKernel,
     /// Whether each cell gets a standard error.
@@ -45,6 +47,7 @@ impl Default for FillOptions {
             block_deg: None,
             nodes: None,
             tolerance: None,
+            target_error: None,
             kernel: &Matern32,
             with_errors: false,
             symmetry: None,
@@ -112,6 +115,10 @@ impl FillOptions {
                 .unwrap_or(preset.block_deg.max(2.0 * self.step_deg)),
             neighbours: self.nodes.unwrap_or(preset.neighbours),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
+            target_error: match (self.target_error, self.tolerance) {
+                (None, Some(_)) => 0.0,
+                (target, _) => target.unwrap_or(preset.target_error),
+            },
             kernel: self.kernel,
             // Who asks for a tolerance gets it.
             budget: self.tolerance.map_or(preset.budget, |_| f32::INFINITY),
@@ -145,6 +152,13 @@ impl FillOptions {
                 "--tolerance",
                 settings.tolerance.to_string(),
                 "must be 0 or more, or inf".into(),
+            );
+        }
+        if !(0.0..=1.0).contains(&settings.target_error) {
+            return refuse(
+                "--target-error",
+                (100.0 * settings.target_error).to_string(),
+                "must lie in 0..=100 percent".into(),
             );
         }
         self.check_together(grid)?;
@@ -292,6 +306,11 @@ mod tests {
             (wrong(|o| o.block_deg = Some(1.0)), "--block 1"),
             (wrong(|o| o.nodes = Some(7)), "--nodes 7"),
             (wrong(|o| o.tolerance = Some(f32::NAN)), "--tolerance NaN"),
+            (
+                wrong(|o| o.target_error = Some(f32::NAN)),
+                "--target-error NaN",
+            ),
+            (wrong(|o| o.target_error = Some(1.5)), "--target-error 150"),
             (
                 wrong(|o| {
                     o.with_errors = true;

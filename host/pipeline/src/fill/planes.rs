@@ -6,7 +6,7 @@ use super::prepared::Prepared;
 use super::symmetry::fit_of_others;
 use crate::Error;
 use crate::progress::{Progress, Step, step};
-use gonia_brdf::interpolate::{AnyKernel, FillSettings, NewBlock};
+use gonia_brdf::interpolate::{AnyKernel, ErrorFall, FillSettings, NewBlock};
 use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Grid, Symmetry};
 use gonia_rig::SampleValues;
@@ -18,6 +18,8 @@ pub(super) struct Planes {
     pub values: Vec<Vec<f32>>,
     /// Standard errors; of no length unless they are asked for.
     pub errors: Vec<Vec<f32>>,
+    /// How errors fall with more frames, by the first group.
+    pub fall: Option<ErrorFall>,
 }
 
 impl Planes {
@@ -27,6 +29,7 @@ impl Planes {
             with_errors,
             values: vec![Vec::new(); channels],
             errors: vec![Vec::new(); channels],
+            fall: None,
         }
     }
 
@@ -95,6 +98,7 @@ impl Planes {
         dyn AnyKernel: NewBlock<N>,
     {
         let filled = fill_bins_of(bins, start, self.with_errors, progress)?;
+        self.fall = self.fall.or(filled.fall);
         let errors = filled.errors.map(|bars| bars.standard_error);
         self.take(channels, filled.dense.into_planes(), errors);
         Ok(filled.settings)

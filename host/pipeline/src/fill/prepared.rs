@@ -31,6 +31,8 @@ pub(super) struct Prepared {
     /// … and the images that the bins hold.
     pub completed_by: Symmetry,
     pub origins: OriginCounts,
+    /// Cells into which samples fell themselves, where the bins hold their images too.
+    pub own: Option<Vec<u64>>,
     pub remarks: Vec<Remark>,
 }
 
@@ -77,12 +79,14 @@ impl Prepared {
             _ => Isotropy::Shown,
         };
         let images = symmetry.order();
-        let bins = if images > 1 {
-            Bins::new(grid, &symmetry.completed(samples.to_vec()))
+        let (bins, own) = if images > 1 {
+            let own = bins.bins().iter().map(|bin| bin.cell).collect::<Vec<u64>>();
+            let completed = Bins::new(grid, &symmetry.completed(samples.to_vec()));
+            (completed, Some(own))
         } else {
-            bins
+            (bins, None)
         };
-        let origins = Origins::of(&bins, fit.as_ref()).counts();
+        let origins = Origins::of(&bins, own.as_deref(), fit.as_ref()).counts();
         remarks.extend(warnings::remark_on_layout(&samples, &origins, isotropy));
         Ok(Self {
             bins,
@@ -93,6 +97,7 @@ impl Prepared {
             symmetry: format!("{symmetry}, {reason}"),
             completed_by: symmetry,
             origins,
+            own,
             remarks,
         })
     }
@@ -102,11 +107,10 @@ impl Prepared {
         let mut facts = of_this_program();
         facts.insert("interpolation".into(), settings.to_owned());
         facts.insert("symmetry".into(), self.symmetry.clone());
-        // A fit of the samples as they are: with their file and this it can be made again, but for a plane that was
-        // stated.
-        let is_stated = options.symmetry_of_plane().is_some();
-        if self.fit.is_some() && self.are_few && !is_stated {
-            let symmetry = fit_symmetry(options.symmetry).to_owned();
+        // A fit of the samples as they are: with their file and this it can be made again.
+        if self.fit.is_some() && self.are_few {
+            let plane = options.symmetry_of_plane().map(|(_, plane)| plane);
+            let symmetry = fit_symmetry(options.symmetry, plane);
             facts.insert(FIT_SYMMETRY.into(), symmetry);
         }
         facts

@@ -104,6 +104,7 @@ fn assert_parts_are_the_whole(of: impl Into<SampleValues>, options: &FillOptions
         path: Path::new("the fill"),
         errors: None,
         scale_by: None,
+        allow_coarse: false,
     };
     let zarr = export_format(&whole, None).unwrap();
     export(source, &whole, zarr, 0).unwrap();
@@ -295,4 +296,37 @@ fn about_a_plane_that_is_known_one_side_is_enough() {
         let said = options.check().unwrap_err().to_string();
         assert!(said.starts_with("--plane"), "{said}");
     }
+}
+
+#[test]
+fn a_fit_about_a_stated_plane_is_made_again_about_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let [csv, dense] = ["s.csv", "d.exr"].map(|name| dir.path().join(name));
+    // Lights and views on one side of the plane, which they do not show.
+    let mut random = Random::new(5);
+    let mut direction =
+        || Direction::from_deg(random.between(0.0, 80.0), random.between(20.0, 200.0));
+    let one_side: Vec<Sample> = (0..120)
+        .map(|_| {
+            let (light, view) = (direction(), direction());
+            let along = truth(light, view, 0, 1);
+            Sample::new(light, view, [along; 3])
+        })
+        .collect();
+    gonia_formats::samples::write_samples(&csv, &one_side).unwrap();
+    let options = FillOptions {
+        symmetry: Some(SymmetryKind::Bilateral),
+        plane_deg: Some(20.0),
+        ..FillOptions::with_step_deg(15.0)
+    };
+    let facts = gonia_formats::fit_source::files_of_samples(&dense, std::slice::from_ref(&csv));
+    let (scale, facts) = (Scale::Relative, facts.unwrap());
+    let channels = gonia_formats::samples::read_channels(&csv).unwrap().values;
+    fill_to_file(channels, scale, &options, &dense, &facts, &silent).unwrap();
+    let mut lookup = gonia_formats::dense::DenseLookup::open(&dense).unwrap();
+    let Behind::Fit { fit, .. } = Behind::of(&dense, &mut lookup).unwrap() else {
+        panic!("the grid is asked");
+    };
+    let plane = fit.choice().settings.symmetry.plane();
+    assert_eq!(plane.map(gonia_brdf::MirrorPlane::azimuth_deg), Some(20.0));
 }

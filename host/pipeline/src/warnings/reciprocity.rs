@@ -75,7 +75,7 @@ fn pairs_of_bins(bins: &Bins) -> Vec<Pair> {
         .step_by(step)
         .filter_map(|bin| {
             let (light, view) = grid.light_and_view(bin.cell as usize);
-            let mirrored = grid.cell(view, light) as u32;
+            let mirrored = grid.cell(view, light) as u64;
             // Each pair once, unless only one of its bins is looked at.
             if mirrored == bin.cell || (step == 1 && mirrored < bin.cell) {
                 return None;

@@ -48,7 +48,7 @@ __all__ = [
     "__version__",
 ]
 
-_ORIGINS = ("measured", "reciprocal", "interpolated", "extrapolated")
+_ORIGINS = ("measured", "reciprocal", "interpolated", "extrapolated", "symmetric")
 
 
 class GoniaWarning(UserWarning):
@@ -163,7 +163,7 @@ class Dense:
 
     @property
     def origin(self) -> NDArray[np.uint8] | None:
-        """Where each value is from, as ``values``: 0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated; or None."""
+        """Where each value is from, as ``values``: 0 measured, 1 reciprocal, 2 interpolated, 3 extrapolated, 4 by symmetry; or None."""
         origins = self._of.origins
         if origins is None:
             return None
@@ -219,12 +219,14 @@ class Dense:
         format: str | None = None,
         resolution: int | None = None,
         assume_scale: float | None = None,
+        allow_coarse: bool = False,
     ) -> dict[str, Any]:
         """Writes another program's format, by the ending or by name (``gonia export --list-formats``).
 
-        A dict: how far the file, read back, is from the values (``median``, ``p99``, ``rms`` of abs(ln)).
+        Uncertainties go where the format has a place for them. A grid that is too coarse for the format is refused, unless
+        ``allow_coarse``. A dict: how far the file, read back, is from the values (``median``, ``p99``, ``rms`` of abs(ln)).
         """
-        found = _gonia.export(self._of, os.fspath(path), format, resolution, assume_scale)
+        found = _gonia.export(self._of, os.fspath(path), format, resolution, assume_scale, allow_coarse)
         _warn(found["remarks"])
         return found
 
@@ -242,7 +244,7 @@ class Dense:
         if self.u is not None:
             data["u"] = stacked(self.u, "standard uncertainty (k = 1)")
         if self.origin is not None:
-            flags = {"flag_values": np.arange(4, dtype=np.uint8), "flag_meanings": " ".join(_ORIGINS)}
+            flags = {"flag_values": np.arange(len(_ORIGINS), dtype=np.uint8), "flag_meanings": " ".join(_ORIGINS)}
             data["origin"] = (dims[1:], self.origin, flags)
         degrees = {"units": "degree"}
         coordinates = {"channel": self.channels}

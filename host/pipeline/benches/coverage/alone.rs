@@ -1,0 +1,174 @@
+//! Sessions that have one error alone, beside the same sessions without it: noise and interpolation cancel in their ratio,
+//! so that what the error changes is seen by itself.
+
+use crate::session::{Errors, Session, nominal, with_directions_off};
+use gonia_brdf::model::{Brdf, Ggx};
+use gonia_brdf::{Elementary, Grid};
+use gonia_pipeline::budget::{CellUncertainty, Effect, budget_of};
+use gonia_pipeline::process::{Masks, process};
+use gonia_pipeline::{FillOptions, Filled, fill, silent};
+use gonia_rig::{Budget, Input, Scale};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// An error is so many times what is stated: it must show.
+const SCALE: f64 = 4.0;
+/// Of these standard uncertainties, along and across.
+const SIZES: [f64; 2] = [1.0, -1.5];
+/// Fewer poses determine cells less well.
+const POSES: usize = 60;
+/// Coarse enough to be quick, fine enough for the slopes of the material.
+const STEP_DEG: f64 = 6.0;
+const SEED: u64 = 77;
+
+/// Dark with a broad lobe: black level, stray light, the camera's curve and directions all change it.
+fn material() -> Arc<dyn Brdf> {
+    Arc::new(Ggx {
+        diffuse: [0.04; 3],
+        specular: [1.0; 3],
+        f0: 0.08,
+        alpha_x: 0.5,
+        alpha_y: 0.4,
+        azimuth_deg: 65.0,
+    })
+}
+
+/// A session's cells.
+fn filled(errors: Errors) -> (Filled, Budget) {
+    let rig = nominal(SCALE);
+    let session = Session::new(&rig, material(), errors, (SEED, POSES));
+    let go = &|_, _| ControlFlow::Continue(());
+    let mut done = process(&rig, &session, &Masks::default(), go).expect("frames are sound");
+    with_directions_off(&mut done.samples, &session.errors);
+    let budget = budget_of(&rig, done.calibration, &done.samples);
+    let options = FillOptions {
+        with_errors: true,
+        ..FillOptions::with_step_deg(STEP_DEG)
+    };
+    let filled =
+        fill(done.samples, Scale::Absolute, &options, &silent).expect("samples are enough");
+    (filled, budget)
+}
+
+/// What an error does.
+#[derive(Clone, Copy, Debug)]
+pub struct Alone {
+    /// The size of the error that its changes show by least squares over the cells, over the true one.
+    pub ratio: f64,
+    /// Share of the changes' sum of squares that the budget's effects explain.
+    pub explained: f64,
+    /// Share of the cells whose change lies within U (k = 2) of the noise and this input …
+    pub within: f64,
+    /// … and of the noise alone: of cells in which the budget says that the error is more than the noise.
+    pub left_out: f64,
+}
+
+/// A session without errors, which others are compared with.
+pub struct Baseline {
+    filled: Filled,
+    budget: Budget,
+    cells: Vec<usize>,
+}
+
+impl Baseline {
+    /// Of noise alone.
+    pub fn new() -> Self {
+        let (filled, budget) = filled(Errors::one(Input::Reference, 0.0, [0.0; 2]));
+        let grid = filled.dense.grid;
+        let origin = &filled.errors.as_ref().expect("asked for").origin;
+        let cells = cells(grid).filter(|cell| origin[*cell] != 3).collect();
+        Self {
+            filled,
+            budget,
+            cells,
+        }
+    }
+
+    /// What an error of one input changes.
+    pub fn with_error_of(&self, input: Input) -> Alone {
+        let grid = self.filled.dense.grid;
+        let (found, _) = filled(Errors::one(input, SCALE, SIZES));
+        let plane = &self.filled.dense.planes[1];
+        let noise = &self
+            .filled
+            .errors
+            .as_ref()
+            .expect("asked for")
+            .standard_error[1];
+        let alone = Input::ALL
+            .into_iter()
+            .fold(self.budget.clone(), |of, other| {
+                if other == input {
+                    of
+                } else {
+                    of.with(other, 0.0)
+                }
+            });
+        let cells = CellUncertainty::new(grid, plane, &alone).expect("its own plane");
+        // Normal equations of the changes over the input's effects, at most two.
+        let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
+        let (mut within, mut left_out, mut shows) = (0.0f64, 0.0, 0.0f64);
+        for cell in &self.cells {
+            let (light, view) = grid.light_and_view(*cell);
+            let value = f64::from(plane[*cell]);
+            let change = f64::from(found.dense.planes[1][*cell]) / value - 1.0;
+            let effects = cells.effects(light, view);
+            let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
+            let stated: Vec<f64> = of_input.map(|effect| effects.of(effect)).collect();
+            let scatter = (f64::from(noise[*cell]) / value).powi(2);
+            // Cells count by how well noise and interpolation let them be known.
+            let weight = 1.0 / scatter.max(1e-8);
+            let pair = [stated[0], stated.get(1).copied().unwrap_or(0.0)];
+            for j in 0..2 {
+                xy[j] += weight * pair[j] * change;
+                (0..2).for_each(|k| xx[j][k] += weight * pair[j] * pair[k]);
+            }
+            yy += weight * change * change;
+            let u: f64 = stated.iter().map(|share| share * share).sum();
+            if u > scatter {
+                shows += 1.0;
+                within += f64::from(change.abs() <= 2.0 * (u + scatter).sqrt());
+                left_out += f64::from(change.abs() <= 2.0 * scatter.sqrt());
+            }
+        }
+        let sizes = solved(xx, xy);
+        let size = |of: [f64; 2]| of[0].hypotenuse(of[1]);
+        Alone {
+            ratio: size(sizes) / size(true_sizes(input)),
+            explained: (sizes[0] * xy[0] + sizes[1] * xy[1]) / yy,
+            within: within / shows.max(1.0),
+            left_out: left_out / shows.max(1.0),
+        }
+    }
+}
+
+/// The standard uncertainties by which an input's effects are off. A cone is as large as it is.
+fn true_sizes(input: Input) -> [f64; 2] {
+    let effects = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
+    match (input, effects.count()) {
+        (Input::LightDiameter | Input::LensDiameter, _) => [1.0, 0.0],
+        (_, 1) => [SIZES[0], 0.0],
+        _ => SIZES,
+    }
+}
+
+/// Solves two normal equations, or one where the second effect is none.
+fn solved(m: [[f64; 2]; 2], b: [f64; 2]) -> [f64; 2] {
+    let determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    if m[1][1] == 0.0 {
+        return [b[0] / m[0][0], 0.0];
+    }
+    [
+        (b[0] * m[1][1] - b[1] * m[0][1]) / determinant,
+        (b[1] * m[0][0] - b[0] * m[1][0]) / determinant,
+    ]
+}
+
+/// One cell of each pair of directions that exchange, without a pole's repeats.
+fn cells(grid: Grid) -> impl Iterator<Item = usize> {
+    (0..grid.n_cells()).filter(move |cell| {
+        let (light, view) = grid.light_and_view(*cell);
+        let repeats = |d: usize| (1..grid.n_phi()).contains(&d);
+        !repeats(light) && !repeats(view)
+    })
+}
