@@ -211,11 +211,11 @@ pub const FIGURES: &[Figure] = &[
         run("cargo bench -p gonia-brdf --bench channels -- fabric fast"),
         run("cargo bench -p gonia-brdf --bench channels -- fabric default"),
     ]),
-    figure("target-error", 5.0, Tables, &[
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.005"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.01"),
-        run("cargo bench -p gonia-brdf --bench fill -- fabric sharp --noise 0.002 --target-error 0.02"),
+    figure("target-error", 1.0, Tables, &[
+        run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0"),
+        run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0.005"),
+        run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0.01"),
+        run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0.02"),
     ]),
     figure("binning", 0.4, Tables, &[run("cargo bench -p gonia-brdf --bench bins")]),
     figure("block", 0.1, Tables, &[run("cargo bench -p gonia-brdf --bench block")]),
