@@ -17,6 +17,7 @@ mod places;
 mod planes;
 mod quadratic;
 mod residual;
+mod searches;
 mod table;
 mod trial;
 mod tune;
