@@ -177,7 +177,9 @@ impl Symmetry {
             (_, 0) | (Symmetry::None | Symmetry::Turns, _) => pair,
             (Symmetry::HalfTurn, _) | (Symmetry::HalfTurnBilateral(_), 1) => turned(pair, HALF),
             (Symmetry::Isotropic, _) => reflected(pair, [1.0, 0.0]),
-            (Symmetry::Bilateral(plane), _) | (Symmetry::HalfTurnBilateral(plane), 2) => other(plane),
+            (Symmetry::Bilateral(plane), _) | (Symmetry::HalfTurnBilateral(plane), 2) => {
+                other(plane)
+            }
             (Symmetry::HalfTurnBilateral(plane), _) => turned(other(plane), HALF),
         }
     }

@@ -281,8 +281,8 @@ fn charts_of(folder: &Path) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_formats::cell_mask::write_mask;
     use gonia_brdf::DenseBrdf;
+    use gonia_formats::cell_mask::write_mask;
     use gonia_formats::dense::{write_dense, write_dense_channels};
     use gonia_rig::{CellMask, Scale};
 
