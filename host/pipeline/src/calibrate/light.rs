@@ -184,12 +184,7 @@ impl Light {
             &everything,
             (None, Some(&first)),
         )?;
-        if let Some([level, within]) = unlike(&all, typical) {
-            let unlike = LightState::Unlike {
-                surface: known.surface,
-                level,
-                within,
-            };
+        if let Some(unlike) = unlike(&all, typical, known.surface) {
             return known.by_mirror_or(rig, unlike);
         }
         let full = joined(known.camera, &all, &prior, &everything)?;
@@ -214,14 +209,7 @@ impl Light {
         let held = free(&[false; LIGHT.len()], prior.len());
         let before = solve_light(&shading, &nominal, &prior, &held, (Some(&all.own), None))?;
         let residuals = residuals_of(&shading, &before, &solved);
-        let typical = |i: usize| median(residuals.iter().map(|r| r.share[i]).collect());
-        let state = LightState::Found {
-            surface: known.surface,
-            frames: frames.len(),
-            shading: [typical(0), typical(1)],
-            lamp: solved.own[2],
-            arm_deg: [solved.own[0], solved.own[1]],
-        };
+        let state = found_state(known.surface, &residuals, &solved);
         let mirror = shading.mirror.as_ref();
         Ok(Self {
             state,
@@ -308,12 +296,26 @@ fn residuals_of(shading: &Shading<'_>, before: &Solved, after: &Solved) -> Vec<S
     shading.frames.iter().map(of_frame).collect()
 }
 
-/// What a surface shows that does not scatter as it is thought to, where its values have a `typical` noise: standard
-/// deviations of frames' levels and of values within a frame.
-pub fn unlike(solved: &Solved, typical: f64) -> Option<[f64; 2]> {
+fn found_state(surface: Role, residuals: &[ShadingResidual], solved: &Solved) -> LightState {
+    let typical = |i: usize| median(residuals.iter().map(|r| r.share[i]).collect());
+    LightState::Found {
+        surface,
+        frames: residuals.len(),
+        shading: [typical(0), typical(1)],
+        lamp: solved.own[2],
+        arm_deg: [solved.own[0], solved.own[1]],
+    }
+}
+
+/// What a surface shows that does not scatter as it is thought to, where its values have a `typical` noise.
+pub fn unlike(solved: &Solved, typical: f64, surface: Role) -> Option<LightState> {
     let (level, within) = (solved.own[2], solved.noise * typical);
     let is_unlike = level > NOT_AS_THOUGHT || within > NOT_AS_THOUGHT.max(NOISES * typical);
-    is_unlike.then_some([level, within])
+    is_unlike.then_some(LightState::Unlike {
+        surface,
+        level,
+        within,
+    })
 }
 
 /// Where the shared numbers start: the light's, the target's, the intensity's, the reference's.

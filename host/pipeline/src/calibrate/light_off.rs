@@ -9,7 +9,7 @@ use crate::calibrate::shading::{
 };
 use crate::calibrate::unknowns::{LIGHT, TARGET, with_values};
 use gonia_brdf::Pose;
-use gonia_rig::Rig;
+use gonia_rig::{Rig, Role};
 
 /// By how much directions of the light are off, degrees, over the frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub fn light_off(rig: &Rig, poses: &[Pose], mut frames: Vec<ShadedFrame>) -> Opt
     let free = vec![true; prior.len()];
     let first = solve_light(&shading, &nominal, &prior, &free, (None, None)).ok()?;
     let typical = median(frames.iter().map(ShadedFrame::noise).collect());
-    if unlike(&first, typical).is_some() {
+    if unlike(&first, typical, Role::Reference).is_some() {
         return None;
     }
     let (moved, all) = (LIGHT.len() + TARGET, first.shared);

@@ -43,7 +43,7 @@ pub(crate) use shading::{ReferenceValue, ShadedFrame};
 
 use crate::process::FrameSource;
 use crate::progress::{Progress, Step, step};
-use camera::{FEWEST, find_camera, priors};
+use camera::{CameraSolution, FEWEST, find_camera, priors};
 use choose::chosen;
 use frames::Look;
 use gonia_brdf::Pose;
@@ -148,14 +148,8 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
     };
     let taken: Vec<Pose> = lines.iter().map(|frame| frame.row.pose).collect();
     let poses = stated_poses(&taken);
-    let u_as_it_was =
-        direction_u_of_light_as_it_was(rig, &camera.shared, &camera.covariance, &poses);
-    let mut light = Light::find(&with_camera, seen.shaded, &known)?;
-    if let Some(found) = light.solution() {
-        let numbers = [&camera.shared[..], &found.shared].concat();
-        let u = direction_u(rig, &[&CAMERA, &LIGHT], &numbers, &found.covariance, &poses);
-        light = light.unless_told(u[0].p95, u_as_it_was[0].p95);
-    }
+    let light = Light::find(&with_camera, seen.shaded, &known)?;
+    let (light, direction_u) = told(rig, &camera, light, &poses);
     let mut remarks = seen.remarks;
     remarks.extend(mirror.iter().flat_map(MirrorLight::remarks));
     remarks.extend(light.remark());
@@ -171,7 +165,6 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
         &camera.covariance,
         &camera.states,
     );
-    let mut unknowns = vec![&CAMERA[..]];
     let (mut shared, mut covariance) = (camera.shared, camera.covariance);
     if let Some(light) = light.solution() {
         let prior = priors(&LIGHT, rig);
@@ -188,14 +181,9 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
             &own,
             &light.states,
         ));
-        unknowns.push(&LIGHT[..]);
         shared.extend_from_slice(&light.shared);
         covariance = light.covariance.clone();
     }
-    let direction_u = match light.solution() {
-        Some(_) => direction_u(rig, &unknowns, &shared, &covariance, &poses),
-        None => u_as_it_was,
-    };
     let median = |rig: &Rig| Spread::of(lines.iter().map(|f| misfit_px(rig, f)).collect()).p50;
     let calibration = record(&numbers, lines.len(), seen.checksum, shared, &covariance);
     Ok(Calibrated {
@@ -219,6 +207,21 @@ fn conclude(rig: &Rig, looked_at: usize, seen: Seen) -> Result<Calibrated, Calib
             ..found
         },
     })
+}
+
+/// The light, left as it was where a material hardly tells where it is, and the standard uncertainties of directions.
+fn told(rig: &Rig, camera: &CameraSolution, light: Light, poses: &[Pose]) -> (Light, [Spread; 2]) {
+    let as_it_was = direction_u_of_light_as_it_was(rig, &camera.shared, &camera.covariance, poses);
+    let Some(found) = light.solution() else {
+        return (light, as_it_was);
+    };
+    let numbers = [&camera.shared[..], &found.shared].concat();
+    let u = direction_u(rig, &[&CAMERA, &LIGHT], &numbers, &found.covariance, poses);
+    let light = light.unless_told(u[0].p95, as_it_was[0].p95);
+    match light.solution() {
+        Some(_) => (light, u),
+        None => (light, as_it_was),
+    }
 }
 
 /// That many frames do not bear the found camera out: of few frames a wrong one can fit those that do.
