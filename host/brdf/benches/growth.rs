@@ -3,8 +3,8 @@
 //! `cargo bench -p gonia-brdf --bench growth` prints a table. Each row runs in a process of its own; its
 //! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
 //! `cargo xtask figures fill-fine` measures that. `-- --few` prints the table of few samples alone, at random pairs of
-//! directions: time of a grid of 2°, and error and coverage of the fit at others; a material or a number of samples after
-//! it leaves the other rows out.
+//! directions: time of a grid of 2°, and error and coverage of the fit at others; materials or numbers of samples after
+//! it leave the other rows out, `seed=9` draws other samples, and `blocks` fills by blocks what is not isotropic.
 
 #![allow(clippy::expect_used)]
 
@@ -13,7 +13,7 @@ mod plan;
 use gonia_brdf::interpolate::{Data, FillSettings, fill, select};
 use gonia_brdf::progress::silent;
 use gonia_brdf::random::Random;
-use gonia_brdf::scattered::{FEW_ANISOTROPIC, ScatteredFit};
+use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Brdf, DenseBrdf, Direction, Elementary, Grid, Sample};
 use plan::{cpu_seconds, material, measure};
 use std::process::Command;
@@ -118,26 +118,32 @@ fn few_samples(only: &[String]) {
         "| material | samples | symmetry found | choosing, CPU-s | fill, CPU-s | with error bars, CPU-s | RMS | at nodes | within 95 % bars | at nodes |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let names = ["satin-paint", "fabric"];
-    let is_one = |word: &String| names.contains(&word.as_str());
-    let is_count = |word: &String| word.parse::<usize>().is_ok();
-    let wanted = |word: &str, is_such: &dyn Fn(&String) -> bool| {
-        !only.iter().any(is_such) || only.iter().any(|a| a == word)
-    };
-    for name in names.into_iter().filter(|name| wanted(name, &is_one)) {
+    let others: Vec<&str> = plan::named(only);
+    let is_named = |name: &&str| only.iter().any(|a| a == name);
+    let mut names: Vec<&str> = others.into_iter().filter(is_named).collect();
+    if names.is_empty() {
+        names = vec!["satin-paint", "fabric"];
+    }
+    let numbers = only.iter().filter_map(|word| word.parse().ok());
+    let mut counts: Vec<usize> = numbers.collect();
+    if counts.is_empty() {
+        counts = FEW.to_vec();
+    }
+    let by_blocks = only.iter().any(|a| a == "blocks");
+    let mut seeds = only.iter().filter_map(|a| a.strip_prefix("seed="));
+    let seed: Option<u64> = seeds.next().map(|seed| seed.parse().expect("a number"));
+    for name in names {
         let material = material(name);
-        for samples in FEW
-            .into_iter()
-            .filter(|n| wanted(&n.to_string(), &is_count))
-        {
-            few_row(name, &*material, samples);
+        for samples in &counts {
+            let seed = seed.unwrap_or(*samples as u64);
+            few_row(name, &*material, *samples, seed, by_blocks);
         }
     }
 }
 
-fn few_row(name: &str, material: &dyn Brdf, count: usize) {
+fn few_row(name: &str, material: &dyn Brdf, count: usize, seed: u64, by_blocks: bool) {
     let grid = Grid::with_step_deg(2.0).expect("a grid step");
-    let mut random = Random::new(count as u64);
+    let mut random = Random::new(seed);
     let lowest = 80f64.to_radians().cosine();
     let mut direction = || {
         let theta = random.between(lowest, 1.0).arc_cosine();
@@ -162,7 +168,7 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize) {
     let fit = ScatteredFit::new(&samples, None).expect("enough samples");
     let choosing = lap();
     let symmetry = fit.choice().settings.symmetry;
-    let by_blocks = fit.places() > FEW_ANISOTROPIC && !symmetry.is_isotropic();
+    let by_blocks = by_blocks && !symmetry.is_isotropic();
     let mut at_nodes = (f64::NAN, f64::NAN);
     let times = [false, true].map(|with_errors| {
         if by_blocks && with_errors {

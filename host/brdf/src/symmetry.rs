@@ -161,17 +161,26 @@ impl Symmetry {
         matches!(self, Symmetry::Turns | Symmetry::Isotropic)
     }
 
-    /// The images of a pair that are other places than itself, turns by any angle aside, itself first.
-    pub(crate) fn images(self, pair: Pair) -> Vec<Pair> {
+    /// How many images of a pair are places of their own, turns by any angle aside, itself among them.
+    pub(crate) fn image_count(self) -> usize {
         match self {
-            Symmetry::None | Symmetry::Turns => vec![pair],
-            Symmetry::HalfTurn => vec![pair, turned(pair, HALF)],
-            Symmetry::Isotropic => vec![pair, reflected(pair, [1.0, 0.0])],
-            Symmetry::Bilateral(plane) => vec![pair, reflected(pair, plane.twice())],
-            Symmetry::HalfTurnBilateral(plane) => {
-                let other = reflected(pair, plane.twice());
-                vec![pair, turned(pair, HALF), other, turned(other, HALF)]
+            Symmetry::None | Symmetry::Turns => 1,
+            Symmetry::HalfTurn | Symmetry::Isotropic | Symmetry::Bilateral(_) => 2,
+            Symmetry::HalfTurnBilateral(_) => 4,
+        }
+    }
+
+    /// One of these images; 0 is the pair itself. Each is its own inverse.
+    pub(crate) fn image(self, pair: Pair, number: usize) -> Pair {
+        let other = |plane: MirrorPlane| reflected(pair, plane.twice());
+        match (self, number) {
+            (_, 0) | (Symmetry::None | Symmetry::Turns, _) => pair,
+            (Symmetry::HalfTurn, _) | (Symmetry::HalfTurnBilateral(_), 1) => turned(pair, HALF),
+            (Symmetry::Isotropic, _) => reflected(pair, [1.0, 0.0]),
+            (Symmetry::Bilateral(plane), _) | (Symmetry::HalfTurnBilateral(plane), 2) => {
+                other(plane)
             }
+            (Symmetry::HalfTurnBilateral(plane), _) => turned(other(plane), HALF),
         }
     }
 
@@ -293,7 +302,9 @@ mod tests {
             Symmetry::HalfTurnBilateral(plane),
         ] {
             let completed = symmetry.completed(vec![sample]);
-            let images = symmetry.images(pair(&sample));
+            let images: Vec<Pair> = (0..symmetry.image_count())
+                .map(|k| symmetry.image(pair(&sample), k))
+                .collect();
             assert_eq!(
                 (completed.len(), images.len()),
                 (symmetry.order(), symmetry.order())

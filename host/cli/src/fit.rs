@@ -1,12 +1,13 @@
 //! `gonia fit`: an analytic model fitted to a dense BRDF.
 
+use crate::colours::colours;
 use crate::progress::Progress;
 use crate::remarks;
 use crate::say::outln;
 use crate::table;
 use anyhow::{Context, Result, bail};
 use gonia_brdf::fit::{FitSettings, Loss, StandardFamily};
-use gonia_formats::dense::{check_dense_name, read_dense};
+use gonia_formats::dense::{check_dense_name, read_dense_channels};
 use gonia_formats::fit_toml::{FitNote, FittedNumber};
 use gonia_formats::material::{
     check_material, check_relative, is_material_name, material_endings, write_material,
@@ -18,7 +19,7 @@ use gonia_pipeline::fit::{
     level_remark, write_fit,
 };
 use gonia_pipeline::provenance::program;
-use gonia_rig::Scale;
+use gonia_rig::{Channels, Remark, Scale};
 use std::path::{Path, PathBuf};
 
 /// Fits a model to a dense BRDF by Levenberg and Marquardt's method from many random starts, all
@@ -82,7 +83,21 @@ impl Fit {
         self.check_numbers()?;
         self.check_outputs()?;
         let progress = Progress::new();
-        let mut measured = progress.stage("reading the dense BRDF", |_| read_dense(&self.dense))?;
+        let read = progress.stage("reading the dense BRDF", |_| {
+            read_dense_channels(&self.dense)
+        })?;
+        let fitted_to = checksum::of_channels(&read);
+        if let Channels::Bands(_) = read.channels {
+            remarks::print(&[Remark::new(
+                self.dense.display(),
+                format_args!(
+                    "its {} are fitted as colours (CIE 1931, D65)",
+                    read.channels
+                ),
+                "fit one band alone for its own numbers",
+            )]);
+        }
+        let mut measured = colours(read, &self.dense)?;
         if measured.scale == Scale::Relative && self.assume_scale.is_none() {
             self.output
                 .iter()
@@ -101,7 +116,6 @@ impl Fit {
                 cells
             }
         };
-        let fitted_to = checksum::of_brdf(&measured.brdf);
         if let Some(factor) = self.assume_scale {
             measured = assume_scale(measured, &mut cells, factor).with_context(|| name.clone())?;
         }

@@ -818,22 +818,33 @@ fn bands_are_filled_asked_compared_and_drawn_as_what_they_are() {
     let picture = bench.at("p.png");
     let drawn = ["render", text(&dense), "-o", text(&picture), "--px", "32"];
     gonia_ok(&drawn, "");
-    for (arguments, words) in [
-        (
-            vec!["fit", text(&dense), "--model", "lambert"],
-            "d.exr: has no R, G, B but 31 bands from 400nm to 1000nm; give one of colours",
-        ),
-        (
-            [&fill[..4], &["--method", "nearest"], &step].concat(),
-            "--method with the channels 31 bands from 400nm to 1000nm: only the default",
-        ),
+    let folder = bench.at("bands");
+    fs::create_dir(&folder).unwrap();
+    fs::copy(&dense, folder.join("dense.exr")).unwrap();
+    fs::copy(&error, folder.join("error.exr")).unwrap();
+    gonia_ok(&["report", text(&folder)], "");
+    let report = fs::read_to_string(folder.join("report.html")).unwrap();
+    for said in [
+        "Measured were 31 bands from 400nm to 1000nm",
+        "share of the value, at 560nm",
     ] {
-        let output = gonia(&arguments, "");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        let last = said.lines().last().unwrap_or_default();
-        assert!(last.contains(words), "{said}");
+        assert!(report.contains(said), "{said}");
     }
+    let fit = ["fit", text(&dense), "--model", "lambert", "--starts", "1"];
+    let fitted = gonia_ok(
+        &[&fit[..], &["-o", text(&folder.join("l.exr"))]].concat(),
+        "",
+    );
+    assert!(fitted.contains("lambert"), "{fitted}");
+    gonia_ok(&["report", text(&folder)], "");
+    let report = fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(report.contains("lambert"));
+    let output = gonia(&[&fill[..4], &["--method", "nearest"], &step].concat(), "");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let last = said.lines().last().unwrap_or_default();
+    let words = "--method with the channels 31 bands from 400nm to 1000nm: only the default";
+    assert!(last.contains(words), "{said}");
     // Files of other channels are not one set, and not compared.
     let grey = bench.at("y.csv");
     fs::write(&grey, table_of("Y", &|theta| vec![spectrum(theta, 550.0)])).unwrap();

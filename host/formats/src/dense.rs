@@ -28,7 +28,7 @@ pub fn read_dense(path: &Path) -> Result<DenseFile, FileError> {
         FileError::new(
             path,
             format_args!("has no R, G, B but {channels}"),
-            "give one of colours or of one value: bands are for gonia query, compare, render, photo and export",
+            "give one of colours or of one value: bands are for gonia query, compare, report, fit, render, photo and export",
         )
     })
 }

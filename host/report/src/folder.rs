@@ -4,17 +4,17 @@ use crate::figures::write_figures;
 use crate::files::{DENSE, ERRORS, MEASURED, REPORT, RIG, RIVALS, RIVALS_FIGURE, SUMMARY, TRUTH};
 use crate::html::write_report;
 use crate::input::ReportInput;
-use crate::uncertainty::ErrorBars;
-use gonia_brdf::{Brdf, DenseBrdf, Grid};
+use crate::uncertainty::{ErrorBars, ShownBand};
+use gonia_brdf::{Brdf, Grid};
 use gonia_formats::baselines_toml::BaselineTable;
 use gonia_formats::cell_mask::read_mask;
-use gonia_formats::dense::{ERRORS_OF, read_dense};
+use gonia_formats::dense::{ERRORS_OF, read_dense_channels};
 use gonia_formats::fit_toml::FitNote;
 use gonia_formats::rig_toml::read_rig;
 use gonia_formats::{FileError, Summary, checksum};
-use gonia_pipeline::{Options, Side, Table, compare};
+use gonia_pipeline::{Options, Side, Table, colours_of, compare};
 use gonia_render::Tabulated;
-use gonia_rig::{DenseFile, Remark};
+use gonia_rig::{Channels, DenseChannels, DenseFile, Remark};
 use std::path::{Path, PathBuf};
 
 /// What became of a folder's report.
@@ -29,17 +29,22 @@ pub struct Drawn {
 /// Draws `report.html` from what is in a folder: `dense.exr`, and where they are there and of that
 /// dense BRDF `summary.toml`, `measured.npy`, `truth.exr`, `error.exr`, `rig.toml`, `rivals.toml`, fits
 /// (`*.fit.toml`) and charts (`*.svg`); and the paper's figures into a second folder, if one is given.
+/// Bands are drawn, and compared with the truth, as colours: by the CIE 1931 standard observer under D65.
 ///
 /// # Errors
 /// One line naming the file: no dense BRDF, a file that cannot be used, a truth of another grid, or
 /// the report cannot be written.
 pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, FileError> {
-    let file = read_dense(&folder.join(DENSE))?;
-    let grid = file.brdf.grid();
-    let mut owner = Owner::of(&file.brdf);
+    let path = folder.join(DENSE);
+    let file = read_dense_channels(&path)?;
+    let (grid, band) = (file.grid, ShownBand::of(&file));
+    let mut owner = Owner::of(&file);
+    let mut bands = said_of_bands(&file.channels, band.as_ref());
+    let (file, said) = colours(file, &path)?;
+    bands.extend(said.iter().map(Remark::to_string));
     let rig = optional(&folder.join(RIG), read_rig)?;
     let truth = table_beside(folder, TRUTH, grid)?;
-    let errors = errors_beside(folder, grid, &mut owner)?;
+    let errors = errors_beside(folder, grid, band.as_ref(), &mut owner)?;
     let baselines = optional(&folder.join(RIVALS), BaselineTable::read)?;
     let baselines = baselines
         .filter(|table| owner.keeps(&folder.join(RIVALS), table.dense.as_ref(), "gonia rivals"));
@@ -72,6 +77,7 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, Fil
     let truth = truth.as_ref().map(|truth| Tabulated::new(&truth.brdf));
     let report = folder.join(REPORT);
     let input = ReportInput {
+        bands: &bands,
         truth: truth.as_ref().map(|truth| truth as &dyn Brdf),
         measured: measured.as_ref(),
         errors: errors.as_ref(),
@@ -89,8 +95,26 @@ pub fn report_folder(folder: &Path, figures: Option<&Path>) -> Result<Drawn, Fil
     }
     Ok(Drawn {
         written,
-        remarks: owner.remarks,
+        remarks: said.into_iter().chain(owner.remarks).collect(),
     })
+}
+
+/// A dense BRDF as colours, and what is to be said of that.
+fn colours(file: DenseChannels, path: &Path) -> Result<(DenseFile, Vec<Remark>), FileError> {
+    colours_of(file, path)
+        .ok_or_else(|| FileError::new(path, "its planes differ in size", "make it again"))
+}
+
+/// What stands for bands in the report; nothing of colours.
+fn said_of_bands(channels: &Channels, band: Option<&ShownBand>) -> Vec<String> {
+    let said = |band: &ShownBand| {
+        format!(
+            "Measured were {channels}. They are shown, and compared with the truth, as colours: those of the CIE 1931 \
+             standard observer under D65, in linear sRGB. Error bars are those of the band at {}nm, the nearest to 555nm.",
+            band.wavelength
+        )
+    };
+    band.map(said).into_iter().collect()
 }
 
 /// The summary of a folder as far as it is one of its dense BRDF, and whether it is.
@@ -144,9 +168,9 @@ struct Owner {
 }
 
 impl Owner {
-    fn of(brdf: &DenseBrdf) -> Self {
+    fn of(file: &DenseChannels) -> Self {
         Self {
-            checksum: checksum::of_brdf(brdf),
+            checksum: checksum::of_channels(file),
             remarks: Vec::new(),
         }
     }
@@ -198,11 +222,11 @@ fn optional<T>(
 /// A table beside the dense BRDF, of the same grid; `None` where it is not there.
 fn table_beside(folder: &Path, name: &str, grid: Grid) -> Result<Option<DenseFile>, FileError> {
     let path = folder.join(name);
-    let file = optional(&path, read_dense)?;
-    if let Some(file) = &file {
-        is_of_grid(&path, file.brdf.grid(), grid)?;
-    }
-    Ok(file)
+    let Some(file) = optional(&path, read_dense_channels)? else {
+        return Ok(None);
+    };
+    is_of_grid(&path, file.grid, grid)?;
+    Ok(Some(colours(file, &path)?.0))
 }
 
 fn is_of_grid(path: &Path, found: Grid, wanted: Grid) -> Result<(), FileError> {
@@ -220,14 +244,19 @@ fn is_of_grid(path: &Path, found: Grid, wanted: Grid) -> Result<(), FileError> {
 fn errors_beside(
     folder: &Path,
     grid: Grid,
+    band: Option<&ShownBand>,
     owner: &mut Owner,
 ) -> Result<Option<ErrorBars>, FileError> {
     let path = folder.join(ERRORS);
-    let bars = optional(&path, ErrorBars::read)?;
-    if let Some(bars) = &bars {
-        is_of_grid(&path, bars.errors.grid(), grid)?;
-    }
-    Ok(bars.filter(|bars| {
+    let Some(bars) = optional(&path, |path| ErrorBars::read(path, band))? else {
+        return Ok(None);
+    };
+    let Some(bars) = bars else {
+        owner.drops(&path, "gonia fill --error");
+        return Ok(None);
+    };
+    is_of_grid(&path, bars.errors.grid(), grid)?;
+    Ok(Some(bars).filter(|bars| {
         let of = bars.provenance.get(ERRORS_OF);
         owner.keeps(&path, of, "gonia fill --error")
     }))
@@ -252,8 +281,9 @@ fn charts_of(folder: &Path) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gonia_brdf::DenseBrdf;
     use gonia_formats::cell_mask::write_mask;
-    use gonia_formats::dense::write_dense;
+    use gonia_formats::dense::{write_dense, write_dense_channels};
     use gonia_rig::{CellMask, Scale};
 
     fn flat(step_deg: f64, value: f32) -> DenseFile {
@@ -302,5 +332,53 @@ mod tests {
         write_dense(&dir.path().join(TRUTH), flat(15.0, 0.31)).unwrap();
         let error = report_folder(dir.path(), None).unwrap_err().to_string();
         assert!(error.contains("truth.exr: is of another grid"), "{error}");
+    }
+
+    /// Five bands that are brighter at longer wavelengths, `times` as bright as that.
+    fn bands(times: f32, wavelengths: &[f64]) -> DenseChannels {
+        let grid = Grid::with_step_deg(30.0).unwrap();
+        let of = |nm: &f64| vec![times * (*nm / 1000.0) as f32; grid.n_cells()];
+        DenseChannels {
+            channels: Channels::bands(wavelengths).unwrap().0,
+            grid,
+            planes: wavelengths.iter().map(of).collect(),
+            scale: Scale::Absolute,
+            provenance: [("seed".into(), "7".into())].into(),
+        }
+    }
+
+    #[test]
+    fn bands_are_shown_as_colours_and_their_errors_at_the_most_visible() {
+        const FIVE: [f64; 5] = [400.0, 475.0, 550.0, 625.0, 700.0];
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let dense = bands(0.4, &FIVE);
+        write_dense_channels(&path(DENSE), &dense).unwrap();
+        write_dense_channels(&path(TRUTH), &bands(0.41, &FIVE)).unwrap();
+        let mut errors = bands(0.01, &FIVE);
+        let of = checksum::of_channels(&dense);
+        errors.provenance.insert(ERRORS_OF.into(), of.clone());
+        write_dense_channels(&path(ERRORS), &errors).unwrap();
+        let drawn = report_folder(dir.path(), None).unwrap();
+        assert_eq!(drawn.remarks, []);
+        let text = std::fs::read_to_string(&drawn.written[0]).unwrap();
+        for said in [
+            "Measured were 5 bands from 400nm to 700nm",
+            "the CIE 1931 standard observer under D65",
+            "as a share of the value, at 550nm",
+            "Measured against true",
+        ] {
+            assert!(text.contains(said), "{said}");
+        }
+
+        // Of other bands, as of colours, they are another's.
+        let mut others = bands(0.01, &FIVE[..2]);
+        others.provenance.insert(ERRORS_OF.into(), of);
+        write_dense_channels(&path(ERRORS), &others).unwrap();
+        let drawn = report_folder(dir.path(), None).unwrap();
+        let said = drawn.remarks[0].to_string();
+        assert!(said.contains("was made of another dense.exr"), "{said}");
+        let text = std::fs::read_to_string(&drawn.written[0]).unwrap();
+        assert!(!text.contains("as a share of the value"));
     }
 }

@@ -41,6 +41,7 @@ fn page(input: &ReportInput<'_>) -> Markup {
             body {
                 main {
                     (heading(summary, grid))
+                    (shown_bands(input.bands))
                     (cards(summary, grid))
                     (left_out(input.remarks))
                     (provenance(summary))
@@ -76,6 +77,13 @@ fn heading(summary: &Summary, grid: Grid) -> Markup {
                 (grid.step_deg()) "° steps), " (scale)
             }
         }
+    }
+}
+
+/// What stands for bands, where these were measured.
+fn shown_bands(bands: &[String]) -> Markup {
+    html! {
+        @for said in bands { p.soft { (said) } }
     }
 }
 
@@ -250,9 +258,11 @@ fn slice_sheets(input: &ReportInput<'_>) -> Markup {
             @if let Some(mask) = input.measured.filter(|mask| mask.grid() == grid) {
                 (sheet(panels::measured(&slices::of_mask(mask)), "Measured bins", "the rest is interpolated"))
             }
-            @if let Some(errors) = input.errors.map(|bars| &bars.errors).filter(|errors| errors.grid() == grid) {
-                (sheet(panels::shares(&slices::relative_errors(errors, input.dense)), "Error bars",
-                    "standard error as a share of the value, mean over the channels"))
+            @if let Some(bars) = input.errors.filter(|bars| bars.errors.grid() == grid) {
+                @let of = bars.band.as_ref().map_or("mean over the channels".to_owned(),
+                    |band| format!("at {}nm", band.wavelength));
+                (sheet(panels::shares(&slices::relative_errors(&bars.errors, bars.values(input.dense))), "Error bars",
+                    &format!("standard error as a share of the value, {of}")))
             }
         }
         h2 { "Slices over the light's polar angle" }
@@ -475,6 +485,7 @@ mod tests {
         ];
         ErrorBars {
             errors: DenseBrdf::new(grid, [errors.clone(), errors.clone(), errors]).unwrap(),
+            band: None,
             origins: Vec::new(),
             provenance: provenance.into(),
         }

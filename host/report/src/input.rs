@@ -14,6 +14,8 @@ pub struct ReportInput<'a> {
     pub summary: &'a Summary,
     /// The measured BRDF.
     pub dense: &'a DenseBrdf,
+    /// Where bands were measured, what its colours are, sentence by sentence.
+    pub bands: &'a [String],
     /// The true one, where it is known; drawn beside the measured one, with their difference.
     pub truth: Option<&'a dyn Brdf>,
     /// The cells that hold a measurement, where that is known.
@@ -38,6 +40,7 @@ impl<'a> ReportInput<'a> {
         Self {
             summary,
             dense,
+            bands: &[],
             truth: None,
             measured: None,
             errors: None,

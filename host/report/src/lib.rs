@@ -37,4 +37,4 @@ pub use folder::{Drawn, report_folder};
 pub use html::write_report;
 pub use input::ReportInput;
 pub use make_baselines::make_baselines;
-pub use uncertainty::ErrorBars;
+pub use uncertainty::{ErrorBars, ShownBand};

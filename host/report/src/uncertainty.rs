@@ -4,14 +4,14 @@ use crate::panels;
 use crate::slices;
 use gonia_brdf::DenseBrdf;
 use gonia_brdf::interpolate::ErrorFall;
-use gonia_formats::dense::{read_dense, read_origins};
+use gonia_formats::dense::{read_dense_channels, read_origins};
 use gonia_formats::{FileError, Summary};
 use gonia_pipeline::budget::{
     AlbedoUncertainty, CellBudget, Contribution, Holding, StratumBudget, albedo_uncertainty,
     budget_in, fall_in, not_stated, stated, summary, with_poses,
 };
 use gonia_pipeline::provenance::Provenance;
-use gonia_rig::{Budget, Scale, Stratum};
+use gonia_rig::{Budget, Channels, DenseChannels, DenseFile, Scale, Stratum};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,24 +21,81 @@ use std::path::Path;
 pub struct ErrorBars {
     /// A standard error a value, in its unit.
     pub errors: DenseBrdf,
+    /// Of bands the one that they are shown of; `None` of colours.
+    pub band: Option<ShownBand>,
     /// Where each cell's value is from ([`Origin`](gonia_brdf::interpolate::Origin)); empty where that is not said.
     pub origins: Vec<u8>,
     /// Where they came from; with their budget, if they hold one.
     pub provenance: Provenance,
 }
 
+/// The band of a spectrum that stands for all where one channel is shown.
+#[derive(Clone, Debug)]
+pub struct ShownBand {
+    /// Nanometres.
+    pub wavelength: f64,
+    /// Its values, as a grey.
+    pub values: DenseBrdf,
+}
+
+/// Where the eye is most sensitive, nanometres.
+const MOST_VISIBLE_NM: f64 = 555.0;
+
+impl ShownBand {
+    /// The band nearest to 555 nm; `None` of what has no bands.
+    pub fn of(file: &DenseChannels) -> Option<Self> {
+        let Channels::Bands(wavelengths) = &file.channels else {
+            return None;
+        };
+        let from_most_visible = |nm: f64| (nm - MOST_VISIBLE_NM).abs();
+        let nearest = wavelengths.iter().zip(&file.planes).min_by(|a, b| {
+            let [a, b] = [a.0, b.0].map(|nm| from_most_visible(*nm));
+            a.total_cmp(&b)
+        });
+        let (wavelength, plane) = nearest?;
+        Some(Self {
+            wavelength: *wavelength,
+            values: DenseBrdf::new(file.grid, [0, 1, 2].map(|_| plane.clone()))?,
+        })
+    }
+}
+
 impl ErrorBars {
-    /// Reads what `gonia fill --error` wrote.
+    /// Reads what `gonia fill --error` wrote; of bands, the errors of the one that is shown. `None` where the two are not of
+    /// the same channels.
     ///
     /// # Errors
     /// A file that cannot be read, or is none.
-    pub fn read(path: &Path) -> Result<Self, FileError> {
-        let file = read_dense(path)?;
-        Ok(Self {
-            errors: file.brdf,
+    pub fn read(path: &Path, band: Option<&ShownBand>) -> Result<Option<Self>, FileError> {
+        let file = read_dense_channels(path)?;
+        let provenance = file.provenance.clone();
+        let errors = match (ShownBand::of(&file), band) {
+            (None, None) => file.into_rgb().map(|DenseFile { brdf, .. }| brdf),
+            (Some(own), Some(shown)) if own.wavelength == shown.wavelength => Some(own.values),
+            _ => None,
+        };
+        let Some(errors) = errors else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            errors,
+            band: band.cloned(),
             origins: read_origins(path)?.unwrap_or_default(),
-            provenance: file.provenance,
-        })
+            provenance,
+        }))
+    }
+
+    /// The values that these are the errors of, with colours as they are.
+    pub fn values<'a>(&'a self, colours: &'a DenseBrdf) -> &'a DenseBrdf {
+        self.band.as_ref().map_or(colours, |band| &band.values)
+    }
+
+    /// What the page calls the channel that it is about.
+    fn channel(&self) -> String {
+        match &self.band {
+            Some(band) => format!("{}nm", band.wavelength),
+            None => "green".to_owned(),
+        }
     }
 }
 
@@ -57,12 +114,12 @@ pub fn section(bars: &ErrorBars, dense: &DenseBrdf, summary: &Summary) -> Markup
     }
 }
 
-/// The channel that the page is about: green.
+/// The channel that the page is about: green, or of a band, which is a grey, any.
 const CHANNEL: usize = 1;
 
 fn of_budget(bars: &ErrorBars, dense: &DenseBrdf, scale: Scale, budget: &Budget) -> Markup {
     let errors = (&bars.errors.planes()[CHANNEL][..], Holding::All);
-    let plane = &dense.planes()[CHANNEL];
+    let plane = &bars.values(dense).planes()[CHANNEL];
     let Some(cells) = CellBudget::new(dense.grid(), plane, errors, &bars.origins, budget) else {
         return html! {};
     };
@@ -70,12 +127,12 @@ fn of_budget(bars: &ErrorBars, dense: &DenseBrdf, scale: Scale, budget: &Budget)
     let albedos = [0.0, 30.0, 60.0].map(|theta| albedo_uncertainty(&cells, theta));
     html! {
         p.soft {
-            "Standard uncertainties (k = 1) of the green values as shares of them: medians over the cells of a part of \
+            "Standard uncertainties (k = 1) of the " (bars.channel()) " values as shares of them: medians over the cells of a part of \
              the domain that are not extrapolated. Contributions are independent, and combine as the root of the sum of \
              their squares."
         }
         (table(&parts, budget))
-        (sentence(&parts, &albedos, &bars.provenance, budget, scale))
+        (sentence(&parts, &albedos, bars, budget, scale))
         div.sheets { (map(&cells)) }
         (worth(&parts, &poses(&cells, &bars.provenance)))
     }
@@ -129,7 +186,7 @@ fn table(parts: &[StratumBudget], budget: &Budget) -> Markup {
 fn sentence(
     parts: &[StratumBudget],
     albedos: &[AlbedoUncertainty],
-    provenance: &Provenance,
+    bars: &ErrorBars,
     budget: &Budget,
     scale: Scale,
 ) -> Markup {
@@ -167,7 +224,8 @@ fn sentence(
             format!("{albedo:.3} ± {expanded:.3} at {:.0}°", of.theta_i_deg)
         })
         .collect();
-    let certificate = provenance
+    let certificate = bars
+        .provenance
         .iter()
         .find(|(name, _)| name.rsplit('.').next() == Some("certificate"));
     let counts = |part: &&Contribution| parts.iter().any(|of| of.of(**part) > 0.0);
@@ -181,7 +239,7 @@ fn sentence(
         h3 { "For a paper" }
         blockquote {
             (values) " carry an expanded uncertainty U = k·u with k = 2 (a coverage of about 95 %), u combined by the "
-            "measurement equation from noise, interpolation, " (inputs) ". The median U is " (said.join(", ")) ". The directional albedo in green is "
+            "measurement equation from noise, interpolation, " (inputs) ". The median U is " (said.join(", ")) ". The directional albedo in " (bars.channel()) " is "
             (albedos.join(", ")) " (U, k = 2)."
             @if let Some((_, certificate)) = certificate { " Reference: certificate " (certificate) "." }
         }

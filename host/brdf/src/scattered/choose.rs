@@ -5,6 +5,7 @@ use super::data::{Data, Datum};
 use super::left_out::Tests;
 use super::mirror::{half_turn_is_measured, least, mirror_plane};
 use super::residual::RESIDUAL_MAX;
+use super::searches::Searches;
 use super::trial::{Trial, worse};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
@@ -111,13 +112,17 @@ impl Asked {
 }
 
 /// The symmetries that compete, without a plane, the simplest first.
-fn symmetries(data: &Data, asked: Option<SymmetryKind>, one_azimuth: bool) -> &'static [Symmetry] {
+fn symmetries(
+    searches: &Searches<'_>,
+    asked: Option<SymmetryKind>,
+    one_azimuth: bool,
+) -> &'static [Symmetry] {
     match asked {
         Some(SymmetryKind::Isotropic) => &[Symmetry::Isotropic, Symmetry::Turns],
         Some(SymmetryKind::HalfTurn | SymmetryKind::HalfTurnBilateral) => &[Symmetry::HalfTurn],
         Some(SymmetryKind::None | SymmetryKind::Bilateral) => &[Symmetry::None],
         None if one_azimuth => &[Symmetry::Isotropic, Symmetry::Turns],
-        None if half_turn_is_measured(data, Settings::DEFAULT) => &[
+        None if half_turn_is_measured(searches, Settings::DEFAULT) => &[
             Symmetry::Isotropic,
             Symmetry::Turns,
             Symmetry::HalfTurn,
@@ -135,11 +140,12 @@ pub(super) fn choose(data: &Data, wanted: Option<Asked>) -> Choice {
         None if one_azimuth => Reason::Assumed,
         None => Reason::Shown,
     };
-    let tests = Tests::new(data, TESTS);
+    let searches = Searches::new(data);
+    let tests = Tests::new(&searches, TESTS);
     if tests.numbers.len() < TESTS_MIN {
         return untested(wanted, reason);
     }
-    let first: Vec<Trial> = symmetries(data, asked, one_azimuth)
+    let first: Vec<Trial> = symmetries(&searches, asked, one_azimuth)
         .iter()
         .flat_map(|symmetry| {
             [true, false].map(|reciprocal_data| Settings {
@@ -164,7 +170,7 @@ pub(super) fn choose(data: &Data, wanted: Option<Asked>) -> Choice {
     };
     if may_depend_on_azimuth && best.settings.symmetry.is_isotropic() {
         // A weak dependence takes more tests, and the settings with the least error of their own.
-        let many = Tests::new(data, MANY_TESTS);
+        let many = Tests::new(&searches, MANY_TESTS);
         if many.shows_azimuth(&many.trial(best.settings)) {
             best = with_plane(&trials, &tests, usual, wanted);
         }
@@ -247,7 +253,7 @@ fn with_plane(trials: &[Trial], tests: &Tests, usual: f64, wanted: Option<Asked>
         let (turned, alone) = both(plane);
         return turned.or(alone).unwrap_or(start);
     }
-    let mirror = mirror_plane(tests.data, start.settings);
+    let mirror = mirror_plane(tests.searches, start.settings);
     let Some(plane) = mirror.plane else {
         return start;
     };

@@ -2,14 +2,16 @@
 
 use super::data::{Data, Datum};
 use super::local::{Local, Predicted};
-use super::merge::{Merged, Without};
-use super::places::{Near, Places, exchanged};
+use super::merge::Without;
+use super::places::{Near, exchanged};
 use super::residual::{residual, size};
+use super::searches::{Search, Searches};
 use super::trial::Trial;
 use super::{NEIGHBOURS_MOST, Settings, preferred};
 use crate::direction::Vec3;
 use crate::interpolate::coordinates::Pair;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// In the search for a dependence on the azimuth a residual beyond so many times the median of all counts as that.
 const OUTLIER: f64 = 5.0;
@@ -21,6 +23,7 @@ const WAVES: usize = 16;
 /// Places that are left out.
 pub(super) struct Tests<'a> {
     pub data: &'a Data,
+    pub searches: &'a Searches<'a>,
     pub numbers: Vec<usize>,
 }
 
@@ -34,7 +37,7 @@ struct Around {
 
 /// What tests are predicted from, as long as settings differ in the kernel alone.
 pub(super) struct Neighbourhoods {
-    merged: Merged,
+    search: Arc<Search>,
     tests: Vec<Neighbourhood>,
 }
 
@@ -45,12 +48,14 @@ struct Neighbourhood {
 }
 
 impl<'a> Tests<'a> {
-    pub fn new(data: &'a Data, at_most: usize) -> Self {
+    pub fn new(searches: &'a Searches<'a>, at_most: usize) -> Self {
+        let data = searches.data;
         let (all, count) = (data.places.len(), data.places.len().min(at_most));
         // Evenly among all, in an order without the period of any scan.
         let numbers = (0..count).map(|k| (k * all + all / 2) / count);
         Self {
             data,
+            searches,
             numbers: numbers.collect(),
         }
     }
@@ -62,8 +67,8 @@ impl<'a> Tests<'a> {
     /// The data around the tests without their own groups, as many as any trial takes: they do not depend on
     /// the kernel.
     pub fn neighbourhoods(&self, settings: Settings) -> Neighbourhoods {
-        let merged = Merged::new(self.data, &settings);
-        let places = Places::new(&merged.data, &settings);
+        let search = self.searches.of(&settings);
+        let (merged, places) = (&search.merged, &search.places);
         let around = |test: &Datum, place: Pair| {
             let without = |datum| merged.without(datum, test.group, self.data, &settings);
             let keep = |datum: u32| !matches!(without(datum), Without::Nothing);
@@ -90,13 +95,13 @@ impl<'a> Tests<'a> {
                 }
             })
             .collect();
-        Neighbourhoods { merged, tests }
+        Neighbourhoods { search, tests }
     }
 
     pub fn trial_at(&self, neighbourhoods: &Neighbourhoods, settings: Settings) -> Trial {
         let predicted = |around: &Around| {
             let near = &around.near[..around.near.len().min(settings.neighbours)];
-            let data = &neighbourhoods.merged.data;
+            let data = &neighbourhoods.search.merged.data;
             let mut here: Vec<&Datum> = near.iter().map(|n| &data[n.datum as usize]).collect();
             for (k, datum) in &around.less {
                 if let Some(here) = here.get_mut(*k) {

@@ -1,15 +1,15 @@
 //! The plane on whose two sides a material is most alike.
 
 use super::Settings;
-use super::data::{Data, Datum};
+use super::data::Data;
 use super::local::Local;
-use super::merge::Merged;
-use super::places::Places;
 use super::residual::{residual, size};
+use super::searches::{Search, Searches};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
 use crate::symmetry::MirrorPlane;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Places that are predicted on the other side, at most.
 const TESTS: usize = 320;
@@ -41,8 +41,7 @@ pub(super) struct Mirror {
 struct Images<'a> {
     data: &'a Data,
     settings: Settings,
-    merged: Vec<Datum>,
-    places: Places,
+    search: Arc<Search>,
     tests: Vec<usize>,
     /// Within this distance lie data of others around most of the places.
     usual_distance: f64,
@@ -67,15 +66,14 @@ impl Found {
 }
 
 impl<'a> Images<'a> {
-    fn new(data: &'a Data, settings: Settings) -> Self {
-        let merged = Merged::new(data, &settings).data;
+    fn new(searches: &Searches<'a>, settings: Settings) -> Self {
+        let data = searches.data;
         let count = data.places.len().min(TESTS);
         let tests = (0..count).map(|k| (k * data.places.len() + data.places.len() / 2) / count);
         let mut images = Self {
             data,
             settings,
-            places: Places::new(&merged, &settings),
-            merged,
+            search: searches.of(&settings),
             tests: tests.collect(),
             usual_distance: 0.0,
         };
@@ -93,11 +91,13 @@ impl<'a> Images<'a> {
             let place = settings
                 .coordinates
                 .pair(image(test.light), image(test.view));
-            let keep = |datum: u32| self.merged[datum as usize].group != test.group;
+            let data = &self.search.merged.data;
+            let keep = |datum: u32| data[datum as usize].group != test.group;
             let near = self
+                .search
                 .places
                 .around(place, settings.neighbours, settings, keep);
-            let found = Local::fit(&self.merged, &near, settings)?.at(&place);
+            let found = Local::fit(data, &near, settings)?.at(&place);
             let residuals = [0, 1, 2].map(|c| residual(found.value[c], test.value[c]));
             let nearest = near.get(NEAREST - 1).or(near.last())?;
             Some(Found {
@@ -127,14 +127,14 @@ impl<'a> Images<'a> {
 }
 
 /// Whether data lie where half a turn takes others: else nothing speaks for or against that symmetry.
-pub(super) fn half_turn_is_measured(data: &Data, settings: Settings) -> bool {
-    let images = Images::new(data, settings);
+pub(super) fn half_turn_is_measured(searches: &Searches<'_>, settings: Settings) -> bool {
+    let images = Images::new(searches, settings);
     images.measured(&|v| [-v[0], -v[1], v[2]]).is_some()
 }
 
 /// Looks for the plane.
-pub(super) fn mirror_plane(data: &Data, settings: Settings) -> Mirror {
-    let mut images = Images::new(data, settings);
+pub(super) fn mirror_plane(searches: &Searches<'_>, settings: Settings) -> Mirror {
+    let mut images = Images::new(searches, settings);
     images.settings.neighbours = settings.neighbours.min(COARSE);
     let planes = (180.0 / STEP_DEG) as usize;
     let all: Vec<Option<Vec<Found>>> = (0..planes)

@@ -17,6 +17,7 @@ mod places;
 mod planes;
 mod quadratic;
 mod residual;
+mod searches;
 mod table;
 mod trial;
 mod tune;
@@ -41,9 +42,9 @@ use rayon::prelude::*;
 
 /// More places than this are not few.
 pub const FEW: usize = 100_000;
-/// Above this many places an anisotropic material is interpolated block by block: faster, with about the same
-/// error.
-pub const FEW_ANISOTROPIC: usize = 20_000;
+/// Above this many places of more than three channels an anisotropic material is interpolated block by block: 31 channels
+/// share a factorisation there.
+pub const FEW_OF_BANDS: usize = 20_000;
 /// Fewer places than this say nothing.
 pub const PLACES_MIN: usize = 8;
 /// Frames that hold more places than this, on average, are images of many samples.

@@ -23,10 +23,12 @@ impl Near {
     }
 }
 
-/// All images of all data.
+/// All data, and where they count.
 pub(super) struct Places {
-    images: Vec<(Pair, u32)>,
+    held: Vec<(Pair, u32)>,
     tree: Option<ImmutableKdTree<f32, 6>>,
+    /// Whether all images of the data are held; else those near to a place are found near the place's own images.
+    holds_images: bool,
 }
 
 /// The search underestimates the distance of turned places by up to a factor of two: so it returns this many
@@ -36,30 +38,40 @@ const MORE: usize = 3;
 const SAME2: f64 = 1e-12;
 
 impl Places {
+    /// With all images of the data: for many searches.
     pub fn new(data: &[Datum], settings: &Settings) -> Self {
-        let mut images = Vec::with_capacity(2 * data.len());
-        for (number, datum) in data.iter().enumerate() {
+        let images = image_count(settings);
+        let held = (0u32..).zip(data).flat_map(|(number, datum)| {
             let pair = settings.coordinates.pair(datum.light, datum.view);
-            for image in settings.symmetry.images(pair) {
-                images.push((image, number as u32));
-                if settings.reciprocal_data {
-                    images.push((exchanged(image), number as u32));
-                }
-            }
-        }
-        let at: Vec<[f32; 6]> = images
+            (0..images).map(move |k| (image(pair, k, settings), number))
+        });
+        Self::holding(held.collect(), settings, true)
+    }
+
+    /// Without their images: for few searches, with any settings that have these coordinates, and turn as these do or do
+    /// not.
+    pub fn without_images(data: &[Datum], settings: &Settings) -> Self {
+        let held = (0u32..)
+            .zip(data)
+            .map(|(number, datum)| (settings.coordinates.pair(datum.light, datum.view), number));
+        Self::holding(held.collect(), settings, false)
+    }
+
+    fn holding(held: Vec<(Pair, u32)>, settings: &Settings, holds_images: bool) -> Self {
+        let at: Vec<[f32; 6]> = held
             .iter()
             .map(|(pair, _)| settings.symmetry.search_place(*pair))
             .collect();
         Self {
             tree: ImmutableKdTree::new_from_slice(&at).ok(),
-            images,
+            held,
+            holds_images,
         }
     }
 
     /// Number of images.
     pub fn images(&self) -> usize {
-        self.images.len()
+        self.held.len()
     }
 
     /// The `n` images nearest to a place, nearest first, of data that are kept.
@@ -70,26 +82,15 @@ impl Places {
         settings: &Settings,
         keep: impl Fn(u32) -> bool,
     ) -> Vec<Near> {
-        let Some(tree) = &self.tree else {
-            return Vec::new();
-        };
-        let query = settings.symmetry.search_place(place);
         let mut wanted = if settings.symmetry.is_isotropic() {
             MORE * n
         } else {
             n + 8
         };
         loop {
-            let many = wanted.min(self.images.len());
-            let Some(size) = NonZero::new(many) else {
-                return Vec::new();
-            };
-            let mut near: Vec<Near> = tree
-                .query(&query)
-                .nearest_n::<SquaredEuclidean<f32>>(size)
-                .execute()
+            let mut near: Vec<Near> = self
+                .nearest(place, wanted, settings)
                 .into_iter()
-                .map(|found| self.images[found.item as usize])
                 .filter(|(_, datum)| keep(*datum))
                 .map(|(pair, datum)| {
                     let pair = settings.symmetry.aligned(pair, place);
@@ -106,12 +107,64 @@ impl Places {
                 order.then_with(|| a.datum.cmp(&b.datum))
             });
             near.dedup_by(|b, a| a.datum == b.datum && distance2(&a.pair, &b.pair) < SAME2);
-            if near.len() >= n || many == self.images.len() {
+            let all = match self.holds_images {
+                true => self.held.len(),
+                false => self.held.len() * image_count(settings),
+            };
+            if near.len() >= n || wanted >= all {
                 near.truncate(n);
                 return near;
             }
-            wanted = 2 * many;
+            wanted *= 2;
         }
+    }
+
+    /// So many images, or all, nearest as the search sees it.
+    fn nearest(&self, place: Pair, wanted: usize, settings: &Settings) -> Vec<(Pair, u32)> {
+        let many = NonZero::new(wanted.min(self.held.len()));
+        let (Some(tree), Some(many)) = (&self.tree, many) else {
+            return Vec::new();
+        };
+        let searches = match self.holds_images {
+            true => 1,
+            false => image_count(settings),
+        };
+        // Each image is its own inverse: a datum's is as far from the place as the datum from the place's.
+        let mut found: Vec<(f32, usize, u32)> = Vec::new();
+        for k in 0..searches {
+            let query = settings.symmetry.search_place(image(place, k, settings));
+            let search = tree.query(&query);
+            let search = search.nearest_n::<SquaredEuclidean<f32>>(many);
+            let nearer = match found.get(wanted - 1) {
+                Some((farthest, _, _)) => search.within(*farthest).execute(),
+                None => search.execute(),
+            };
+            found.extend(nearer.into_iter().map(|f| (f.distance, k, f.item)));
+            found.sort_by(|a, b| a.0.total_cmp(&b.0));
+            found.truncate(wanted);
+        }
+        let images = found.into_iter().map(|(_, k, item)| {
+            let (pair, datum) = self.held[item as usize];
+            (image(pair, k, settings), datum)
+        });
+        images.collect()
+    }
+}
+
+/// How many images count as a datum, itself among them, turns by any angle aside.
+fn image_count(settings: &Settings) -> usize {
+    settings.symmetry.image_count() * if settings.reciprocal_data { 2 } else { 1 }
+}
+
+/// The image of a number: the symmetry's, each followed by its reciprocal one where that counts; 0 is the pair itself.
+fn image(pair: Pair, number: usize, settings: &Settings) -> Pair {
+    if !settings.reciprocal_data {
+        return settings.symmetry.image(pair, number);
+    }
+    let image = settings.symmetry.image(pair, number / 2);
+    match number % 2 {
+        0 => image,
+        _ => exchanged(image),
     }
 }
 
@@ -144,4 +197,61 @@ pub(super) fn exchanged(p: Pair) -> Pair {
 
 pub(super) fn distance2(a: &Pair, b: &Pair) -> f64 {
     (0..6).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::direction::Direction;
+    use crate::random::Random;
+    use crate::symmetry::{MirrorPlane, Symmetry};
+
+    #[test]
+    fn images_that_are_not_held_are_found_as_those_that_are() {
+        let mut random = Random::new(5);
+        let mut direction = || {
+            let (theta, phi) = (random.between(0.0, 85.0), random.between(0.0, 360.0));
+            Direction::from_deg(theta, phi).to_vec3()
+        };
+        let mut datum = |group: u32| Datum {
+            light: direction(),
+            view: direction(),
+            value: [1.0; 3],
+            log: [0.0; 3],
+            count: 1.0,
+            group,
+        };
+        let data: Vec<Datum> = (0..400).map(&mut datum).collect();
+        let tests: Vec<Datum> = (0..10).map(&mut datum).collect();
+        let plane = MirrorPlane::at_deg(22.5);
+        for symmetry in [
+            Symmetry::None,
+            Symmetry::HalfTurn,
+            Symmetry::Bilateral(plane),
+            Symmetry::HalfTurnBilateral(plane),
+            Symmetry::Turns,
+            Symmetry::Isotropic,
+        ] {
+            for reciprocal_data in [true, false] {
+                let settings = Settings {
+                    symmetry,
+                    reciprocal_data,
+                    ..Settings::DEFAULT
+                };
+                let all = Places::new(&data, &settings);
+                let bare = Places::without_images(&data, &settings);
+                for test in &tests {
+                    let place = settings.coordinates.pair(test.light, test.view);
+                    // Up to all images of all data.
+                    for n in [1, 64, 4000] {
+                        let found = |places: &Places| -> Vec<(u32, f64)> {
+                            let near = places.around(place, n, &settings, |datum| datum % 7 > 0);
+                            near.iter().map(|n| (n.datum, n.distance())).collect()
+                        };
+                        assert_eq!(found(&all), found(&bare), "{symmetry}, {n}");
+                    }
+                }
+            }
+        }
+    }
 }

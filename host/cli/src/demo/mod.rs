@@ -332,7 +332,7 @@ impl Run {
         self.progress.stage("writing the error bars", |_| {
             write_error_bars(&path, grid, errors, combine, dense.scale, &facts)
         })?;
-        Ok((Some(ErrorBars::read(&path)?), coverage))
+        Ok((ErrorBars::read(&path, None)?, coverage))
     }
 
     /// The samples in bands, their dense BRDF, the true one, and how far these are apart.
