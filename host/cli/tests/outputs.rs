@@ -775,6 +775,7 @@ fn table_of(names: &str, values: &dyn Fn(f64) -> Vec<f64>) -> String {
     table
 }
 
+// long: one table goes through every command
 #[test]
 fn bands_are_filled_asked_compared_and_drawn_as_what_they_are() {
     let bench = Bench::new();
