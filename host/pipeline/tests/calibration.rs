@@ -687,7 +687,8 @@ fn where_calibration_fails_it_says_so() {
                 level,
                 within,
             } => says.push(format!(
-                "the {surface:?} is not as it is said to be, by {:.0} and {:.0} %: the light stays",
+                "the {} is not as it is said to be, by {:.0} and {:.0} %: the light stays",
+                format!("{surface:?}").to_lowercase(),
                 100.0 * level,
                 100.0 * within
             )),
