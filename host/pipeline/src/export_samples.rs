@@ -222,23 +222,11 @@ fn noise_variance(samples: &SampleValues) -> Option<f32> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::budget::fixture::uncertain_of;
     use gonia_brdf::model::{Brdf, Ggx};
     use gonia_brdf::{DenseBrdf, Elementary, Sample};
     use gonia_formats::export::{How, export_format};
-    use gonia_rig::{Channels, DenseFile, Input, ReferenceCalibration, Rig};
-
-    /// A rig of which nothing is uncertain but `inputs`.
-    fn uncertain_of(inputs: &[(Input, f64)]) -> Budget {
-        let rig = Rig::paper(100);
-        let known = ReferenceCalibration::KnownReference;
-        let none = Budget::new(known, 0.3, [1100.0, 1800.0, 14.0], |input| rig.input(input));
-        let none = Input::ALL
-            .into_iter()
-            .fold(none, |of, input| of.with(input, 0.0));
-        inputs
-            .iter()
-            .fold(none, |of, (input, u)| of.with(*input, *u))
-    }
+    use gonia_rig::{Channels, DenseFile, Input};
 
     fn read(path: &Path) -> Vec<Point> {
         let How::Points { read, .. } = export_format(path, None).unwrap().how else {

@@ -30,6 +30,8 @@ mod contribution;
 mod directions;
 mod equation;
 mod fits;
+#[cfg(test)]
+pub(crate) mod fixture;
 mod poses;
 mod record;
 mod samples;

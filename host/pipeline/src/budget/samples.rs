@@ -43,16 +43,11 @@ pub fn scale_uncertainty(budget: &Budget, samples: &[Sample]) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gonia_rig::{Input, ReferenceCalibration, Rig};
+    use crate::budget::fixture::uncertain_of;
+    use gonia_rig::Input;
 
     #[test]
     fn a_samples_uncertainty_is_that_of_the_equation_with_its_frames_mean_around_it() {
-        let rig = Rig::paper(100);
-        let known = ReferenceCalibration::KnownReference;
-        let none = Budget::new(known, 0.3, [1100.0, 1800.0, 14.0], |input| rig.input(input));
-        let none = Input::ALL
-            .into_iter()
-            .fold(none, |of, input| of.with(input, 0.0));
         let at = |deg: f64| Direction::from_deg(deg, 0.0);
         let sample = |value: f32, frame| Sample::new(at(0.0), at(20.0), [value; 3]).in_frame(frame);
         let samples = [
@@ -61,13 +56,13 @@ mod tests {
             sample(0.2, 2),
             sample(-0.1, 2),
         ];
-        let reference = scale_uncertainty(&none.clone().with(Input::Reference, 0.02), &samples);
+        let reference = scale_uncertainty(&uncertain_of(&[(Input::Reference, 0.02)]), &samples);
         let close = |a: f32, b: f32| (a - b).abs() < 1e-6;
         assert!(close(reference[0][1], 0.002) && close(reference[1][2], 0.006));
         // Of a value that is not positive nothing is a share.
         assert_eq!(reference[3], [0.0; 3]);
         // Stray light is a share of the frame's mean, 0.2 and 0.05, and the sample looks smaller from 20 degrees.
-        let stray = scale_uncertainty(&none.with(Input::StrayLight, 0.01), &samples);
+        let stray = scale_uncertainty(&uncertain_of(&[(Input::StrayLight, 0.01)]), &samples);
         for (found, expected) in stray.iter().zip([0.001f32, 0.001, 0.0015]) {
             let expected = expected * at(20.0).to_vec3()[2] as f32;
             assert!(close(found[0], expected), "{stray:?}");

@@ -286,6 +286,7 @@ pub fn not_stated(budget: &Budget) -> Vec<Contribution> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::fixture::uncertain_of;
     use gonia_brdf::DenseBrdf;
     use gonia_brdf::model::Ggx;
     use gonia_rig::{ReferenceCalibration, Rig};
@@ -362,9 +363,7 @@ mod tests {
     #[test]
     fn coverage_counts_the_cells_whose_truth_lies_within_u() {
         let grid = Grid::with_step_deg(15.0).unwrap();
-        let none = Input::ALL
-            .into_iter()
-            .fold(budget(), |of, input| of.with(input, 0.0));
+        let none = uncertain_of(&[]);
         // Every second direction of view is 3 u off, the others half a u.
         let off = |view: usize| if view.is_multiple_of(2) { 1.03 } else { 1.005 };
         let plane: Vec<f32> = (0..grid.n_cells())

@@ -45,7 +45,7 @@ impl Behind {
             return Ok(Self::Grid);
         };
         let other = |what: String| {
-            let remedy = "the grid is asked, linear between its nodes; make it anew with gonia fill, or give --grid";
+            let remedy = "the grid is evaluated, linear between its nodes; make it anew with gonia fill, or give --grid";
             Ok(Self::Other(Remark::new(path.display(), what, remedy)))
         };
         let samples = match source.find(path) {

@@ -325,7 +325,7 @@ fn a_fit_about_a_stated_plane_is_made_again_about_it() {
     fill_to_file(channels, scale, &options, &dense, &facts, &silent).unwrap();
     let mut lookup = gonia_formats::dense::DenseLookup::open(&dense).unwrap();
     let Behind::Fit { fit, .. } = Behind::of(&dense, &mut lookup).unwrap() else {
-        panic!("the grid is asked");
+        panic!("the grid is evaluated");
     };
     let plane = fit.choice().settings.symmetry.plane();
     assert_eq!(plane.map(gonia_brdf::MirrorPlane::azimuth_deg), Some(20.0));
