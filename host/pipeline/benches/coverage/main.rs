@@ -1,26 +1,28 @@
 //! Whether U (k = 2) is true: sessions whose rigs, references, lamps and cameras have errors drawn from the stated
 //! uncertainties, from frames to cells, against the truth.
 //!
-//! `cargo bench -p gonia-pipeline --bench coverage [-- SESSIONS] [--poses N] [MATERIAL …]` prints, for each material and
-//! part of the domain, the share of cells (all but extrapolated ones) whose true value lies within U of the found one:
-//! of sessions with all errors, then of ones that have noise and interpolation alone. Without materials it goes on with
-//! sessions that have one error alone, against the same sessions without it: how large the change is that the error
-//! makes, over what the budget says of it.
+//! `cargo bench -p gonia-pipeline --bench coverage [-- SESSIONS] [--poses N] [--inputs] [MATERIAL …]` prints, for each
+//! material and part of the domain, the share of cells (all but extrapolated ones) whose true value lies within U of the
+//! found one, with its standard error by the sessions' scatter: of so many sessions with all errors, then of a quarter as
+//! many that have noise and interpolation alone. With `--inputs` it says what each input's error changes, against what the
+//! budget says. Without materials it goes on with sessions that have one error alone, against the same sessions without it.
 
 #![allow(clippy::expect_used, clippy::unwrap_used)]
 
 mod alone;
 mod count;
+mod inputs;
 mod materials;
 mod session;
 
 use alone::Baseline;
-use count::{Bar, Counts, PARTS};
+use count::{Bar, Counts, PARTS, Sessions};
 use gonia_brdf::model::Brdf;
 use gonia_pipeline::budget::{CellUncertainty, budget_of};
 use gonia_pipeline::process::{Masks, process};
 use gonia_pipeline::{FillOptions, Filled, fill, silent};
 use gonia_rig::{Budget, Input, Scale};
+use inputs::Inputs;
 use materials::{OWN, UNSEEN, named};
 use rayon::prelude::*;
 use session::{Errors, Session, nominal, with_directions_off};
@@ -35,7 +37,7 @@ fn run(
     material: &Arc<dyn Brdf>,
     (seed, poses): (u64, usize),
     has: &dyn Fn(Input) -> bool,
-) -> (Filled, Budget) {
+) -> (Filled, Budget, Errors) {
     let rig = nominal(1.0);
     let errors = Errors::draw(seed, 1.0, has);
     let session = Session::new(&rig, material.clone(), errors, (seed, poses));
@@ -54,20 +56,29 @@ fn run(
     };
     let filled =
         fill(done.samples, Scale::Absolute, &options, &silent).expect("samples are enough");
-    (filled, budget)
+    (filled, budget, session.errors)
 }
 
-fn counted(material: &Arc<dyn Brdf>, of: (u64, usize), has: &dyn Fn(Input) -> bool) -> Counts {
-    let (filled, budget) = run(material, of, has);
+fn counted(
+    material: &Arc<dyn Brdf>,
+    of: (u64, usize),
+    has: &dyn Fn(Input) -> bool,
+) -> (Counts, Inputs) {
+    let (filled, budget, drawn) = run(material, of, has);
     let errors = filled.errors.as_ref().expect("asked for");
-    let plane = &filled.dense.planes[1];
-    let cells = CellUncertainty::new(filled.dense.grid, plane, &budget).expect("its own plane");
+    let (grid, plane) = (filled.dense.grid, &filled.dense.planes[1]);
+    let cells = CellUncertainty::new(grid, plane, &budget).expect("its own plane");
     let bar = Bar {
         noise: &errors.standard_error[1],
         origin: &errors.origin,
         plane,
     };
-    count::count(&cells, &bar, filled.dense.grid, material.as_ref())
+    let (mut counts, mut inputs) = (Counts::default(), Inputs::of(&drawn));
+    count::visit(&cells, &bar, (grid, material.as_ref()), |cell| {
+        counts.add(cell);
+        inputs.add(cell);
+    });
+    (counts, inputs)
 }
 
 fn main() {
@@ -93,17 +104,29 @@ fn main() {
         names
     };
     let columns = PARTS.map(count::name).join(" | ");
-    println!("| within U (k = 2), % | {columns} | RMS of error/u |");
-    println!("|---{}|---|", "|---".repeat(PARTS.len()));
+    println!(
+        "| within U (k = 2), % | sessions | {columns} | RMS of error/u | of misses above U, % |"
+    );
+    println!("|---|---{}|---|---|", "|---".repeat(PARTS.len()));
+    let mut of_inputs = Vec::new();
     for name in &names {
         let material = named(name);
+        // Sessions of their own: materials that shared theirs would be right or wrong together.
+        let at = OWN.iter().chain(&UNSEEN).position(|of| of == name);
+        let first = 1000 * (1 + at.unwrap_or(0) as u64);
         for (what, all) in [("", true), (", noise and interpolation alone", false)] {
-            let counts = (0..sessions / 4)
+            let count = if all { sessions } else { sessions.div_ceil(4) };
+            let (counts, inputs): (Vec<Counts>, Vec<Inputs>) = (0..count)
                 .into_par_iter()
-                .map(|seed| counted(&material, (1000 + seed, poses_of), &|_| all))
-                .collect::<Vec<_>>();
-            println!("| {name}{what} | {} |", count::sum(&counts));
+                .map(|seed| counted(&material, (first + seed, poses_of), &|_| all))
+                .unzip();
+            println!("| {name}{what} | {} |", Sessions(counts));
+            let sum = inputs.into_iter().reduce(|sum, of| sum.join(&of));
+            of_inputs.extend(sum.filter(|_| all).map(|sum| (*name, sum)));
         }
+    }
+    if rest.iter().any(|a| a == "--inputs") {
+        of_inputs.iter().for_each(|(name, of)| of.print(name));
     }
     if is_whole {
         each_alone();

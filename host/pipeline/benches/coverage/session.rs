@@ -120,9 +120,9 @@ impl Brdf for OverCones {
                 -across[0] * d[2],
                 across[0] * d[1] - across[1] * d[0],
             ];
-            (0..6)
+            (0..4)
                 .map(|k| {
-                    let (s, c) = (f64::from(k) * std::f64::consts::FRAC_PI_3).sine_cosine();
+                    let (s, c) = (f64::from(k) * std::f64::consts::FRAC_PI_2).sine_cosine();
                     let r = radius / 2f64.sqrt();
                     let to = [0, 1, 2].map(|j| d[j] + r * (c * along[j] + s * across[j]));
                     gonia_brdf::direction::normalize(to)
@@ -134,7 +134,7 @@ impl Brdf for OverCones {
         for light in &lights {
             for view in &views {
                 let value = self.of.eval(*light, *view);
-                (0..3).for_each(|c| sum[c] += value[c] / 36.0);
+                (0..3).for_each(|c| sum[c] += value[c] / 16.0);
             }
         }
         sum
