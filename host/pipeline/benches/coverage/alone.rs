@@ -104,12 +104,8 @@ impl Baseline {
         let scale = scale(input);
         let (found, _) = filled(Errors::one(input, scale, SIZES), scale, false);
         let plane = &self.filled.dense.planes[1];
-        let noise = &self
-            .filled
-            .errors
-            .as_ref()
-            .expect("asked for")
-            .standard_error[1];
+        let errors = self.filled.errors.as_ref().expect("asked for");
+        let (noise, origin) = (&errors.standard_error[1], &errors.origin);
         let alone = Input::ALL
             .into_iter()
             .fold(self.budget.clone(), |of, other| {
@@ -120,7 +116,7 @@ impl Baseline {
                     of.with(other, 0.0)
                 }
             });
-        let cells = CellUncertainty::new(grid, plane, &alone).expect("its own plane");
+        let cells = CellUncertainty::new(grid, plane, origin, &alone).expect("its own plane");
         // Normal equations of the changes over the input's effects, at most two.
         let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
         let (mut within, mut left_out, mut shows) = (0.0f64, 0.0, 0.0f64);

@@ -145,7 +145,7 @@ pub fn visit(
     let bright = brightest(grid, |cell| truths[cell]);
     let bright_as_found = brightest(grid, |cell| f64::from(bar.plane[cell]));
     // Poles repeat one value.
-    let repeats = |d: usize| d % grid.n_phi() > 0 && d < grid.n_phi();
+    let repeats = |d: usize| (1..grid.n_phi()).contains(&d);
     for (cell, truth) in truths.into_iter().enumerate() {
         let (light, view) = grid.light_and_view(cell);
         if view < light || bar.origin[cell] == 3 || repeats(light) || repeats(view) {

@@ -67,7 +67,7 @@ fn counted(
     let (filled, budget, drawn) = run(material, of, has);
     let errors = filled.errors.as_ref().expect("asked for");
     let (grid, plane) = (filled.dense.grid, &filled.dense.planes[1]);
-    let cells = CellUncertainty::new(grid, plane, &budget).expect("its own plane");
+    let cells = CellUncertainty::new(grid, plane, &errors.origin, &budget).expect("its own plane");
     let bar = Bar {
         noise: &errors.standard_error[1],
         origin: &errors.origin,

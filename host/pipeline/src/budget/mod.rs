@@ -32,9 +32,11 @@ mod equation;
 mod fits;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod patches;
 mod poses;
 mod record;
 mod samples;
+mod sides;
 mod summary;
 
 pub use albedo::{AlbedoUncertainty, albedo_uncertainty};
