@@ -64,7 +64,7 @@ pub struct Cell {
 
 impl Cell {
     /// The combined standard uncertainty, as a share of the found value.
-    fn u(&self) -> f64 {
+    pub fn u(&self) -> f64 {
         let shares: f64 = Effect::ALL.iter().map(|e| self.effects.square(*e)).sum();
         (self.noise * self.noise + shares).sqrt()
     }
@@ -90,6 +90,7 @@ impl Counts {
 }
 
 /// Of many sessions. The cells of a session share its errors, so that sessions count, not cells.
+#[derive(Default)]
 pub struct Sessions(pub Vec<Counts>);
 
 impl Sessions {

@@ -4,30 +4,50 @@ use crate::count::{Cell, PARTS, name};
 use crate::session::Errors;
 use gonia_pipeline::budget::Effect;
 use gonia_rig::Input;
+use std::fmt::Write;
 
 const N: usize = Effect::ALL.len();
 /// One cell in so many tells of all: a prime, so that all rows and columns are met.
 const ONE_IN: usize = 7;
 
-/// Sums over cells and sessions, by part of the domain.
-#[derive(Clone)]
+/// Sums over the cells of a session, by part of the domain.
 pub struct Inputs {
-    of: Vec<Sums>,
+    of: [Sums; PARTS.len()],
     seen: usize,
     /// The size of each effect's error in this session, in standard uncertainties, with its sign.
     sizes: [f64; N],
 }
 
-#[derive(Clone)]
+/// Each cell's squares count as shares of its combined variance: else the few cells that are known worst would be all.
+#[derive(Clone, Copy)]
 struct Sums {
     cells: f64,
-    /// Squares that the budget states: of each effect, and of noise and interpolation.
+    /// What the budget states: of each effect.
     stated: [f64; N],
-    noise: f64,
     /// Normal equations of the changes over each effect times its size: a factor of 1 is right.
     xx: [[f64; N]; N],
     xy: [f64; N],
     yy: f64,
+}
+
+impl Sums {
+    const NONE: Self = Self {
+        cells: 0.0,
+        stated: [0.0; N],
+        xx: [[0.0; N]; N],
+        xy: [0.0; N],
+        yy: 0.0,
+    };
+
+    fn add(&mut self, of: &Self, sign: f64) {
+        self.cells += sign * of.cells;
+        self.yy += sign * of.yy;
+        for k in 0..N {
+            self.stated[k] += sign * of.stated[k];
+            self.xy[k] += sign * of.xy[k];
+            (0..N).for_each(|j| self.xx[k][j] += sign * of.xx[k][j]);
+        }
+    }
 }
 
 impl Inputs {
@@ -46,16 +66,8 @@ impl Inputs {
                 _ => errors.pair(input)[which] / crate::session::stated(input),
             }
         });
-        let none = Sums {
-            cells: 0.0,
-            stated: [0.0; N],
-            noise: 0.0,
-            xx: [[0.0; N]; N],
-            xy: [0.0; N],
-            yy: 0.0,
-        };
         Self {
-            of: vec![none; PARTS.len()],
+            of: [Sums::NONE; PARTS.len()],
             seen: 0,
             sizes,
         }
@@ -67,64 +79,61 @@ impl Inputs {
         if !self.seen.is_multiple_of(ONE_IN) {
             return;
         }
+        let per_variance = 1.0 / cell.u().powi(2);
         // The found value less the true one, as a share of the true one: errors of scale act on that.
         let change = 1.0 / (1.0 + cell.off) - 1.0;
-        let sides = Effect::ALL.map(|effect| cell.effects.of(effect));
-        let x: Vec<f64> = (0..N).map(|k| sides[k] * self.sizes[k]).collect();
-        for (is_in, of) in cell.is_in.iter().zip(&mut self.of) {
-            if !is_in {
-                continue;
-            }
-            of.cells += 1.0;
-            of.noise += cell.noise * cell.noise;
-            of.yy += change * change;
-            for (k, effect) in Effect::ALL.into_iter().enumerate() {
-                of.stated[k] += cell.effects.square(effect);
-                of.xy[k] += x[k] * change;
-                (0..N).for_each(|j| of.xx[k][j] += x[k] * x[j]);
-            }
+        let means = Effect::ALL.map(|effect| cell.effects.of(effect));
+        let mut one = Sums::NONE;
+        (one.cells, one.yy) = (1.0, per_variance * change * change);
+        for (k, effect) in Effect::ALL.into_iter().enumerate() {
+            let x = per_variance * means[k] * self.sizes[k];
+            one.stated[k] = per_variance * cell.effects.square(effect);
+            one.xy[k] = x * change;
+            (0..N).for_each(|j| one.xx[k][j] = x * means[j] * self.sizes[j]);
+        }
+        for (_, of) in cell.is_in.iter().zip(&mut self.of).filter(|of| *of.0) {
+            of.add(&one, 1.0);
         }
     }
+}
 
-    /// Adds another session's.
-    pub fn join(mut self, other: &Self) -> Self {
-        for (sum, of) in self.of.iter_mut().zip(&other.of) {
-            sum.cells += of.cells;
-            sum.noise += of.noise;
-            sum.yy += of.yy;
-            for k in 0..N {
-                sum.stated[k] += of.stated[k];
-                sum.xy[k] += of.xy[k];
-                (0..N).for_each(|j| sum.xx[k][j] += of.xx[k][j]);
-            }
+/// A table of sessions: of each part of the domain and each effect the share of the combined variance that the budget states,
+/// the share that its drawn errors would have made at the stated sensitivities, and the factor by which the changes follow
+/// these, with its standard error by leaving out one session after the other.
+pub fn table(material: &str, all: &[&Inputs]) -> String {
+    let mut text = String::new();
+    for (at, part) in PARTS.iter().enumerate().take(4) {
+        let mut sum = Sums::NONE;
+        all.iter().for_each(|of| sum.add(&of.of[at], 1.0));
+        let factors = solved(sum.xx, sum.xy);
+        let mut squares = [0.0; N];
+        for of in all {
+            let mut others = sum;
+            others.add(&of.of[at], -1.0);
+            let without = solved(others.xx, others.xy);
+            (0..N).for_each(|k| squares[k] += (without[k] - factors[k]).powi(2));
         }
-        self
-    }
-
-    /// A table: of each part and input the stated standard uncertainty (root mean square over cells, %), the one that its
-    /// drawn errors would have made at the stated sensitivities, and the factor by which the changes follow these.
-    pub fn print(&self, material: &str) {
-        for (part, of) in PARTS.iter().zip(&self.of).take(4) {
-            let per_cell = |square: f64| 100.0 * (square / of.cells).max(0.0).sqrt();
-            let factors = solved(of.xx, of.xy);
-            let explained: f64 = (0..N).map(|k| factors[k] * of.xy[k]).sum();
-            println!(
-                "\n{material}, {}: all errors {:.2} %; noise and interpolation stated {:.2}, found {:.2}",
-                name(*part),
-                per_cell(of.yy),
-                per_cell(of.noise),
-                per_cell(of.yy - explained),
+        let explained: f64 = (0..N).map(|k| factors[k] * sum.xy[k]).sum();
+        let noise = 1.0 - sum.stated.iter().sum::<f64>() / sum.cells;
+        let _ = writeln!(
+            text,
+            "{material}, {}: (error/u)² {:.2}; noise and interpolation stated {noise:.3}, found {:.3}",
+            name(*part),
+            sum.yy / sum.cells,
+            (sum.yy - explained) / sum.cells,
+        );
+        for (k, effect) in Effect::ALL.into_iter().enumerate() {
+            let _ = writeln!(
+                text,
+                "  {effect:?}: stated {:.4}, as drawn {:.4}, factor {:.2} ± {:.2}",
+                sum.stated[k] / sum.cells,
+                sum.xx[k][k] / sum.cells,
+                factors[k],
+                squares[k].sqrt()
             );
-            for (k, effect) in Effect::ALL.into_iter().enumerate() {
-                println!(
-                    "  {effect:?}: stated {:.3} %, as drawn {:.3}, factor {:.2}",
-                    per_cell(of.stated[k]),
-                    per_cell(of.xx[k][k]),
-                    factors[k]
-                );
-            }
         }
     }
+    text
 }
 
 /// Solves normal equations; what has no effect has no factor.

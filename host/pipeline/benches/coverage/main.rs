@@ -15,7 +15,6 @@ mod inputs;
 mod materials;
 mod session;
 
-use alone::Baseline;
 use count::{Bar, Counts, PARTS, Sessions};
 use gonia_brdf::model::Brdf;
 use gonia_pipeline::budget::{CellUncertainty, budget_of};
@@ -26,7 +25,7 @@ use inputs::Inputs;
 use materials::{OWN, UNSEEN, named};
 use rayon::prelude::*;
 use session::{Errors, Session, nominal, with_directions_off};
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 const STEP_DEG: f64 = 6.0;
@@ -81,6 +80,77 @@ fn counted(
     (counts, inputs)
 }
 
+/// So many sessions of each material, then so many more.
+const ROUND: usize = 8;
+/// One session in so many is repeated with noise and interpolation alone.
+const ALONE_ONE_IN: u64 = 4;
+
+/// The sessions of a material.
+struct OfMaterial {
+    name: &'static str,
+    material: Arc<dyn Brdf>,
+    /// Materials that shared their sessions would be right or wrong together.
+    seed: u64,
+    with_errors: Sessions,
+    alone: Sessions,
+    inputs: Vec<Inputs>,
+}
+
+impl OfMaterial {
+    fn new(name: &'static str) -> Self {
+        let at = OWN.iter().chain(&UNSEEN).position(|of| *of == name);
+        Self {
+            name,
+            material: named(name),
+            seed: 1000 * (1 + at.unwrap_or(0) as u64),
+            with_errors: Sessions::default(),
+            alone: Sessions::default(),
+            inputs: Vec::new(),
+        }
+    }
+
+    /// Adds sessions of these numbers.
+    fn go_on(&mut self, numbers: Range<u64>, poses: usize) {
+        let both: Vec<(u64, bool)> = numbers
+            .flat_map(|number| [(number, true), (number, false)])
+            .filter(|(number, all)| *all || number.is_multiple_of(ALONE_ONE_IN))
+            .collect();
+        let counted: Vec<(bool, (Counts, Inputs))> = both
+            .into_par_iter()
+            .map(|(number, all)| {
+                let of = (self.seed + number, poses);
+                (all, counted(&self.material, of, &|_| all))
+            })
+            .collect();
+        for (all, (counts, inputs)) in counted {
+            if all {
+                self.with_errors.0.push(counts);
+                self.inputs.push(inputs);
+            } else {
+                self.alone.0.push(counts);
+            }
+        }
+    }
+}
+
+/// The tables of all.
+fn printed(all: &[OfMaterial], with_inputs: bool) -> String {
+    let columns = PARTS.map(count::name).join(" | ");
+    let mut text = format!(
+        "| within U (k = 2), % | sessions | {columns} | RMS of error/u | of misses above U, % |\n|---{}|---|---|---|\n",
+        "|---".repeat(PARTS.len())
+    );
+    for of in all {
+        text += &format!("| {} | {} |\n", of.name, of.with_errors);
+        text += &format!("| {}, alone | {} |\n", of.name, of.alone);
+    }
+    for of in all.iter().filter(|_| with_inputs) {
+        let inputs: Vec<&Inputs> = of.inputs.iter().collect();
+        text += &inputs::table(of.name, &inputs);
+    }
+    text
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |text: &String| text.parse::<u64>().ok();
@@ -92,7 +162,7 @@ fn main() {
         rest.drain(k..(k + 2).min(rest.len()));
     }
     let sessions = rest.iter().find_map(number).unwrap_or(200);
-    let names: Vec<&str> = OWN
+    let names: Vec<&'static str> = OWN
         .into_iter()
         .chain(UNSEEN)
         .filter(|name| rest.iter().any(|a| a == name))
@@ -103,31 +173,18 @@ fn main() {
     } else {
         names
     };
-    let columns = PARTS.map(count::name).join(" | ");
-    println!(
-        "| within U (k = 2), % | sessions | {columns} | RMS of error/u | of misses above U, % |"
-    );
-    println!("|---|---{}|---|---|", "|---".repeat(PARTS.len()));
-    let mut of_inputs = Vec::new();
-    for name in &names {
-        let material = named(name);
-        // Sessions of their own: materials that shared theirs would be right or wrong together.
-        let at = OWN.iter().chain(&UNSEEN).position(|of| of == name);
-        let first = 1000 * (1 + at.unwrap_or(0) as u64);
-        for (what, all) in [("", true), (", noise and interpolation alone", false)] {
-            let count = if all { sessions } else { sessions.div_ceil(4) };
-            let (counts, inputs): (Vec<Counts>, Vec<Inputs>) = (0..count)
-                .into_par_iter()
-                .map(|seed| counted(&material, (first + seed, poses_of), &|_| all))
-                .unzip();
-            println!("| {name}{what} | {} |", Sessions(counts));
-            let sum = inputs.into_iter().reduce(|sum, of| sum.join(&of));
-            of_inputs.extend(sum.filter(|_| all).map(|sum| (*name, sum)));
+    let with_inputs = rest.iter().any(|a| a == "--inputs");
+    let mut all: Vec<OfMaterial> = names.into_iter().map(OfMaterial::new).collect();
+    // In rounds, each of which adds some sessions to all materials: who stops early has as many of each.
+    for first in (0..sessions).step_by(ROUND) {
+        for of in &mut all {
+            of.go_on(first..(first + ROUND as u64).min(sessions), poses_of);
+        }
+        if first + (ROUND as u64) < sessions {
+            eprintln!("{}", printed(&all, with_inputs));
         }
     }
-    if rest.iter().any(|a| a == "--inputs") {
-        of_inputs.iter().for_each(|(name, of)| of.print(name));
-    }
+    println!("{}", printed(&all, with_inputs));
     if is_whole {
         each_alone();
     }
@@ -139,9 +196,8 @@ fn each_alone() {
         "\n| error alone | size found over true | explained, % | within U, % | left out, % | cells |"
     );
     println!("|---|---|---|---|---|---|");
-    let baseline = Baseline::new();
     for input in Input::ALL {
-        let of = baseline.with_error_of(input);
+        let of = alone::with_error_of(input);
         println!(
             "| {} | {:.2} | {:.1} | {:.1} | {:.1} | {} |",
             input.key(),
