@@ -12,45 +12,83 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// An error is so many times what the bench states otherwise, and its rig states so much: it must show beside noise and
-/// interpolation. A reference that is tilted by more is noticed, and its frames are refused.
-fn scale(input: Input) -> f64 {
-    match input {
-        Input::ReferenceTilt => 1.0,
-        Input::ReferenceHeight | Input::Drift => 8.0,
-        Input::StrayLight => 16.0,
-        // Cones of the same angle: a panel instead of a lamp.
-        Input::LightDiameter => 12.0,
-        Input::LensDiameter => 20.0,
-        _ => 4.0,
+/// A session in which an input's error shows.
+struct Case {
+    input: Input,
+    /// The error is so many times what the bench states otherwise, and its rig states so much.
+    scale: f64,
+    poses: usize,
+    material: Ggx,
+}
+
+impl Case {
+    /// In samples: nothing hides it there. Of a reference that is tilted or raised by more than stated, frames are refused.
+    fn of_samples(input: Input) -> Self {
+        let as_stated = [Input::ReferenceTilt, Input::ReferenceHeight].contains(&input);
+        Self {
+            input,
+            scale: if as_stated { 1.0 } else { 4.0 },
+            poses: 60,
+            material: BROAD,
+        }
+    }
+
+    /// In cells, beside noise and interpolation.
+    fn of_cells(input: Input) -> Self {
+        let (scale, poses, material) = match input {
+            Input::ReferenceTilt => (2.0, 120, matte(0.6)),
+            Input::ReferenceHeight => (8.0, 60, matte(0.6)),
+            Input::Drift => (8.0, 60, BROAD),
+            Input::StrayLight => (16.0, 60, matte(0.04)),
+            Input::LightDirection | Input::ViewDirection => (8.0, 120, BROAD),
+            // Cones of the same angle: a panel instead of a lamp.
+            Input::LightDiameter => (8.0, 120, BROAD),
+            Input::LensDiameter => (13.0, 120, BROAD),
+            _ => (4.0, 60, BROAD),
+        };
+        Self {
+            input,
+            scale,
+            poses,
+            material,
+        }
+    }
+
+    /// The errors of a session that has this one.
+    fn errors(&self) -> Errors {
+        Errors::one(self.input, self.scale, SIZES)
     }
 }
+
 /// Of these standard uncertainties, along and across.
 const SIZES: [f64; 2] = [1.0, -1.5];
-/// Fewer poses determine cells less well.
-const POSES: usize = 60;
 /// Coarse enough to be quick, fine enough for the slopes of the material.
 const STEP_DEG: f64 = 6.0;
 const SEED: u64 = 77;
 
-/// Dark with a broad lobe: black level, stray light, the camera's curve, directions and cones all change it. A raised
-/// reference changes everything by little, which shows on a matte material alone: so is interpolated best.
-fn material(input: Input) -> Arc<dyn Brdf> {
-    let is_matte = input == Input::ReferenceHeight;
-    Arc::new(Ggx {
-        diffuse: [if is_matte { 0.6 } else { 0.04 }; 3],
-        specular: [if is_matte { 0.0 } else { 1.0 }; 3],
-        f0: 0.08,
-        alpha_x: 0.5,
-        alpha_y: 0.4,
-        azimuth_deg: 65.0,
-    })
+/// Dark with a broad lobe: black level, stray light, the camera's curve, directions and cones all change it.
+const BROAD: Ggx = Ggx {
+    diffuse: [0.04; 3],
+    specular: [1.0; 3],
+    f0: 0.08,
+    alpha_x: 0.5,
+    alpha_y: 0.4,
+    azimuth_deg: 65.0,
+};
+
+/// Interpolated best, so that what changes it by little shows.
+fn matte(rho: f64) -> Ggx {
+    Ggx {
+        diffuse: [rho; 3],
+        specular: [0.0; 3],
+        ..BROAD
+    }
 }
 
-/// The samples of a session that is about an input.
-fn sampled(input: Input, errors: Errors) -> (Vec<Sample>, Budget) {
-    let rig = nominal(scale(input));
-    let session = Session::new(&rig, material(input), errors, (SEED, POSES));
+/// The samples of a session.
+fn sampled(case: &Case, errors: Errors) -> (Vec<Sample>, Budget) {
+    let rig = nominal(case.scale);
+    let session = Session::new(&rig, Arc::new(case.material), errors, (SEED, case.poses));
     let go = &|_, _| ControlFlow::Continue(());
     let mut done = process(&rig, &session, &Masks::default(), go).expect("frames are sound");
     with_directions_off(&mut done.samples, &session.errors);
@@ -58,15 +96,15 @@ fn sampled(input: Input, errors: Errors) -> (Vec<Sample>, Budget) {
     (done.samples, budget)
 }
 
-/// Its cells, and a budget that holds that input alone.
-fn filled(input: Input, errors: Errors) -> (Filled, Budget) {
-    let (samples, budget) = sampled(input, errors);
+/// Its cells, and a budget that holds the case's input alone.
+fn filled(case: &Case, errors: Errors) -> (Filled, Budget) {
+    let (samples, budget) = sampled(case, errors);
     let options = FillOptions {
         with_errors: true,
         ..FillOptions::with_step_deg(STEP_DEG)
     };
     let filled = fill(samples, Scale::Absolute, &options, &silent).expect("samples are enough");
-    let others = Input::ALL.into_iter().filter(|other| *other != input);
+    let others = Input::ALL.into_iter().filter(|other| *other != case.input);
     (filled, others.fold(budget, |of, other| of.with(other, 0.0)))
 }
 
@@ -91,14 +129,14 @@ pub struct Alone {
 
 /// What an error of one input does, in a session that has it beside one that has not.
 pub fn with_error_of(input: Input) -> Alone {
-    let (sound, _) = filled(input, without_error());
-    let (found, alone) = filled(input, Errors::one(input, scale(input), SIZES));
+    let case = Case::of_cells(input);
+    let (sound, _) = filled(&case, without_error());
+    let (found, alone) = filled(&case, case.errors());
     let grid = found.dense.grid;
     let [before, plane] = [&sound, &found].map(|of| &of.dense.planes[1]);
     let [first, errors] = [&sound, &found].map(|of| of.errors.as_ref().expect("asked for"));
     let (noise, origin) = (&errors.standard_error[1], &errors.origin);
     let cells = CellUncertainty::new(grid, plane, origin, &alone).expect("its own plane");
-    let material = material(input);
     // Normal equations of the changes over the input's effects, at most two.
     let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
     let (mut within, mut left_out, mut shows) = (0.0f64, 0.0, 0.0f64);
@@ -108,7 +146,7 @@ pub fn with_error_of(input: Input) -> Alone {
         let value = f64::from(plane[cell]);
         let change = value / f64::from(before[cell]) - 1.0;
         let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
-        let off = (material.eval(i, v)[1] / value - 1.0).abs();
+        let off = (case.material.eval(i, v)[1] / value - 1.0).abs();
         let effects = cells.effects(light, view);
         let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
         let stated: Vec<f64> = of_input.clone().map(|effect| effects.of(effect)).collect();
@@ -144,9 +182,9 @@ pub fn with_error_of(input: Input) -> Alone {
 /// session without and with it.
 #[allow(dead_code)] // The bench counts cells alone.
 pub fn samples_with_error_of(input: Input) -> (f64, f64, [usize; 2]) {
-    let (sound, budget) = sampled(input, without_error());
-    let (off, _) = sampled(input, Errors::one(input, scale(input), SIZES));
-    let material = material(input);
+    let case = Case::of_samples(input);
+    let (sound, budget) = sampled(&case, without_error());
+    let (off, _) = sampled(&case, case.errors());
     let equation = Equation::new(&budget);
     let mut frames: HashMap<u32, [f64; 2]> = HashMap::new();
     for sample in &sound {
@@ -164,7 +202,7 @@ pub fn samples_with_error_of(input: Input) -> (f64, f64, [usize; 2]) {
         let [sum, count] = frames[&sample.frame];
         let light = Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into());
         let view = Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into());
-        let at = |(i, v): (Direction, Direction)| material.eval(i.to_vec3(), v.to_vec3())[1];
+        let at = |(i, v): (Direction, Direction)| case.material.eval(i.to_vec3(), v.to_vec3())[1];
         let shape = Shape {
             value,
             surround: sum / count,
