@@ -64,6 +64,11 @@ impl<'a> CellUncertainty<'a> {
 
     /// The effects at a cell, by the indices of its light and view. The table is reciprocal, as every fill is.
     pub fn effects(&self, light: usize, view: usize) -> Effects {
+        self.effects_from(light, view, self.sides.there(light, view))
+    }
+
+    /// The same of a cell whose value comes by a share from samples at its own light and view.
+    fn effects_from(&self, light: usize, view: usize, there: f64) -> Effects {
         let (at_light, at_view) = (&self.nodes[light], &self.nodes[view]);
         let n = self.grid.n_directions();
         let at = |light: u32, view: u32| f64::from(self.plane[light as usize * n + view as usize]);
@@ -89,7 +94,6 @@ impl<'a> CellUncertainty<'a> {
             surround: around / AROUND as f64,
         };
         let slants = (&at_light.slant, &at_view.slant);
-        let there = self.sides.there(light, view);
         self.equation.of_reciprocal(slants, &shape, there)
     }
 }
@@ -114,6 +118,7 @@ pub fn combine_errors<'a>(
             combined: Vec::with_capacity(channels.len()),
             parts: [(); 3].map(|()| vec![0.0; side]),
         };
+        let there = sides.row(light, side);
         for (cells, noise) in channels.iter().zip(noise) {
             let values = &cells.plane[light * side..(light + 1) * side];
             let combined = values
@@ -122,7 +127,7 @@ pub fn combine_errors<'a>(
                 .enumerate()
                 .map(|(view, (value, noise))| {
                     let (value, noise) = (f64::from(*value), f64::from(*noise));
-                    let effects = cells.effects(light, view);
+                    let effects = cells.effects_from(light, view, f64::from(there[view]));
                     let shares = [
                         if value > 0.0 { noise / value } else { 0.0 },
                         effects.u(Part::Direction),

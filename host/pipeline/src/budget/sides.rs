@@ -13,25 +13,26 @@ const REACHES_DEG: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
 
 /// Of each cell, which share of its value comes from samples at its own light and view.
 pub(super) struct Sides {
-    n_directions: usize,
     /// The patch of each direction …
     patches: Vec<u32>,
     /// … and by patches of light and view the share; empty where it is not known.
     shares: Vec<f32>,
     count: usize,
-    /// Whether samples fell into a cell, a bit each, where it is known.
-    measured: Vec<u64>,
+    /// Of each light the views that samples have with it, ascending …
+    views: Vec<Vec<u32>>,
+    /// … and of each view the lights.
+    lights: Vec<Vec<u32>>,
 }
 
 impl Sides {
     /// Of a table of which it is not known: half of a value comes from either.
     pub fn unknown() -> Self {
         Self {
-            n_directions: 1,
             patches: Vec::new(),
             shares: Vec::new(),
             count: 0,
-            measured: Vec::new(),
+            views: Vec::new(),
+            lights: Vec::new(),
         }
     }
 
@@ -55,12 +56,13 @@ impl Sides {
         }
         let centres: Vec<Vec3> = centres.into_iter().map(normalize).collect();
         let mut found = vec![0.0; count * count];
-        let mut bits = vec![0u64; grid.n_cells().div_ceil(64)];
+        let [mut views, mut lights] = [(); 2].map(|()| vec![Vec::new(); n]);
         for (cell, origin) in origins.iter().enumerate() {
             if measured(origin) {
                 let (light, view) = grid.light_and_view(cell);
                 found[of[light] as usize * count + of[view] as usize] += 1.0;
-                bits[cell / 64] |= 1 << (cell % 64);
+                views[light].push(view as u32);
+                lights[view].push(light as u32);
             }
         }
         let about = densities(&centres, &found);
@@ -70,11 +72,11 @@ impl Sides {
             (if both > 0.0 { there / both } else { 0.5 }) as f32
         };
         Self {
-            n_directions: n,
             patches: of,
             shares: (0..count * count).map(share).collect(),
             count,
-            measured: bits,
+            views,
+            lights,
         }
     }
 
@@ -83,11 +85,8 @@ impl Sides {
         if self.shares.is_empty() {
             return 0.5;
         }
-        let is_measured = |light: usize, view: usize| {
-            let cell = light * self.n_directions + view;
-            self.measured[cell / 64] & (1 << (cell % 64)) != 0
-        };
-        match (is_measured(light, view), is_measured(view, light)) {
+        let has = |of: &[Vec<u32>]| of[light].binary_search(&(view as u32)).is_ok();
+        match (has(&self.views), has(&self.lights)) {
             (true, true) => 0.5,
             (true, false) => 1.0,
             (false, true) => 0.0,
@@ -96,6 +95,20 @@ impl Sides {
                 f64::from(self.shares[light * self.count + view])
             }
         }
+    }
+
+    /// The same of all views of a light, of a grid with so many directions.
+    pub fn row(&self, light: usize, directions: usize) -> Vec<f32> {
+        if self.shares.is_empty() {
+            return vec![0.5; directions];
+        }
+        let of_patch = &self.shares[self.patches[light] as usize * self.count..][..self.count];
+        let shares = self.patches.iter().map(|patch| of_patch[*patch as usize]);
+        let mut row: Vec<f32> = shares.collect();
+        for view in self.views[light].iter().chain(&self.lights[light]) {
+            row[*view as usize] = self.there(light, *view as usize) as f32;
+        }
+        row
     }
 }
 
@@ -160,6 +173,11 @@ mod tests {
         assert_eq!(sides.there(steep, low), 1.0);
         assert_eq!(sides.there(low, steep), 0.0);
         assert_eq!(sides.there(one, other), 0.5);
+        let n = grid.n_directions();
+        for light in [steep, low, one, other] {
+            let row = sides.row(light, n);
+            assert!((0..n).all(|view| f64::from(row[view]) == sides.there(light, view)));
+        }
         // Near one of them nearly so, and of both orders all.
         let (beside, below) = (at(66.0, 12.0), at(18.0, 180.0));
         let there = sides.there(beside, below);
