@@ -3,7 +3,6 @@
 use crate::count::{Cell, PARTS, name};
 use crate::session::Errors;
 use gonia_pipeline::budget::Effect;
-use gonia_rig::Input;
 use std::fmt::Write;
 
 const N: usize = Effect::ALL.len();
@@ -60,10 +59,17 @@ impl Inputs {
             };
             let which = pairs[input as usize];
             pairs[input as usize] += 1;
-            match input {
+            let drawn = errors
+                .pair(input)
+                .map(|of| of / crate::session::stated(input));
+            match effect {
                 // A cone is as large as it is stated.
-                Input::LightDiameter | Input::LensDiameter => f64::from(errors.of(input) != 0.0),
-                _ => errors.pair(input)[which] / crate::session::stated(input),
+                Effect::Lamp | Effect::Lens => f64::from(errors.of(input) != 0.0),
+                // The target is turned about x and y, and a reference that is nearer to the light lowers values.
+                Effect::ReferenceTiltX => -drawn[1],
+                Effect::ReferenceTiltY => drawn[0],
+                Effect::ReferenceHeight => -drawn[0],
+                _ => drawn[which],
             }
         });
         Self {
