@@ -86,8 +86,8 @@ impl Inputs {
             return;
         }
         let per_variance = 1.0 / cell.u().powi(2);
-        // The found value less the true one, as a share of the true one: errors of scale act on that.
-        let change = 1.0 / (1.0 + cell.off) - 1.0;
+        // The found value less the true one, as a share of the found one: a true one may be zero.
+        let change = -cell.off;
         let means = Effect::ALL.map(|effect| cell.effects.of(effect));
         let mut one = Sums::NONE;
         (one.cells, one.yy) = (1.0, per_variance * change * change);
