@@ -30,6 +30,7 @@ impl Tests<'_> {
     pub fn suited(&self, start: Trial, usual: f64) -> Trial {
         let systems = [
             Coordinates::sum_difference(0.5),
+            Coordinates::sum_difference(3.0),
             Coordinates {
                 exponent: 0.25,
                 weight: 0.3,
