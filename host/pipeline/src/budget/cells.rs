@@ -1,6 +1,6 @@
 //! The measurement equation at every cell of a dense BRDF, and at any pair of directions of what can be asked.
 
-use crate::budget::equation::{Effects, Equation, Part, Shape, Slant};
+use crate::budget::equation::{Effects, Equation, Shape, Slant};
 use gonia_brdf::{Direction, Elementary, Grid};
 use gonia_formats::dense::ErrorRow;
 use gonia_rig::Budget;
@@ -49,6 +49,20 @@ impl<'a> CellUncertainty<'a> {
 
     /// The effects at a cell, by the indices of its light and view. The table is reciprocal, as every fill is.
     pub fn effects(&self, light: usize, view: usize) -> Effects {
+        let shape = self.shape(light, view);
+        let (light, view) = (&self.nodes[light].slant, &self.nodes[view].slant);
+        self.equation.of_reciprocal(light, view, &shape)
+    }
+
+    /// The squares of the relative standard uncertainties of scale and direction at a cell.
+    fn squares(&self, light: usize, view: usize) -> [f64; 2] {
+        let shape = self.shape(light, view);
+        let (light, view) = (&self.nodes[light].slant, &self.nodes[view].slant);
+        self.equation.squares(light, view, &shape)
+    }
+
+    #[inline(always)]
+    fn shape(&self, light: usize, view: usize) -> Shape {
         let (at_light, at_view) = (&self.nodes[light], &self.nodes[view]);
         let n = self.grid.n_directions();
         let at = |light: u32, view: u32| f64::from(self.plane[light as usize * n + view as usize]);
@@ -67,14 +81,12 @@ impl<'a> CellUncertainty<'a> {
         bends[0] += slopes[0] * at_light.ring;
         bends[1] += slopes[2] * at_view.ring;
         let around: f64 = at_view.around.iter().map(|v| at(i, *v)).sum();
-        let shape = Shape {
+        Shape {
             value,
             slopes,
             bends,
             surround: around / AROUND as f64,
-        };
-        self.equation
-            .of_reciprocal(&at_light.slant, &at_view.slant, &shape)
+        }
     }
 }
 
@@ -103,17 +115,16 @@ pub fn combine_errors<'a>(
                 .enumerate()
                 .map(|(view, (value, noise))| {
                     let (value, noise) = (f64::from(*value), f64::from(*noise));
-                    let effects = cells.effects(light, view);
+                    let [scale, direction] = cells.squares(light, view);
                     let shares = [
                         if value > 0.0 { noise / value } else { 0.0 },
-                        effects.u(Part::Direction),
-                        effects.u(Part::Scale),
+                        direction.sqrt(),
+                        scale.sqrt(),
                     ];
                     for (part, of) in row.parts.iter_mut().zip(shares) {
                         part[view] += (share * of) as f32;
                     }
-                    let known = shares[1] * shares[1] + shares[2] * shares[2];
-                    (noise * noise + value * value * known).sqrt() as f32
+                    (noise * noise + value * value * (scale + direction)).sqrt() as f32
                 });
             let combined = combined.collect();
             row.combined.push(combined);
@@ -264,6 +275,7 @@ fn moved(direction: Direction, [along, across]: [f64; 2]) -> Direction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::equation::Part;
     use gonia_brdf::DenseBrdf;
     use gonia_brdf::model::{Brdf, Ggx};
     use gonia_rig::{Input, ReferenceCalibration, Rig};
@@ -332,6 +344,13 @@ mod tests {
                 let effects = cells.effects(light, view);
                 for u in [Part::Direction, Part::Scale].map(|part| effects.u(part)) {
                     assert!(u.is_finite() && u > 0.0 && u < 1.0, "{light} {view} {u}");
+                }
+                let squares = [Part::Scale, Part::Direction].map(|part| effects.u(part).powi(2));
+                for (short, long) in cells.squares(light, view).iter().zip(squares) {
+                    assert!(
+                        (short - long).abs() < 1e-12 * long,
+                        "{light} {view} {short} {long}"
+                    );
                 }
             }
         }

@@ -214,6 +214,8 @@ impl Slant {
 pub struct Equation {
     is_absolute: bool,
     level: f64,
+    /// Its decimal logarithm.
+    level_log: f64,
     light_mm: f64,
     /// The standard uncertainties of the effects in radians, mm and shares; of the cones, half the variance of a
     /// component of directions in them.
@@ -241,6 +243,7 @@ impl Equation {
         Self {
             is_absolute: budget.calibration == ReferenceCalibration::KnownReference,
             level: budget.level,
+            level_log: budget.level.decimal_log(),
             light_mm: budget.light_mm,
             inputs,
             patch: [patch(budget.light_mm), patch(budget.camera_mm)],
@@ -260,20 +263,61 @@ impl Equation {
         Effects([self.shares(light, view, shape); 2])
     }
 
+    /// The squares of the relative standard uncertainties of scale and direction ([`Effects::u`]) of what
+    /// [`Self::of_reciprocal`] gives, without a list of the effects: a table has hundreds of millions of values.
+    pub fn squares(&self, light: &Slant, view: &Slant, shape: &Shape) -> [f64; 2] {
+        let Some(bright) = self.bright(shape) else {
+            return [0.0; 2];
+        };
+        let mut squares = [0.0; 2];
+        let mut add = |effect: Effect, share: f64| {
+            squares[usize::from(effect.part() == Part::Direction)] += 0.5 * share * share;
+        };
+        self.each(light, view, shape, bright, &mut add);
+        self.each(view, light, &shape.exchanged(), bright, &mut add);
+        squares
+    }
+
     fn shares(&self, light: &Slant, view: &Slant, shape: &Shape) -> [f64; EFFECTS] {
+        let mut effects = [0.0; EFFECTS];
+        if let Some(bright) = self.bright(shape) {
+            self.each(light, view, shape, bright, &mut |effect, share| {
+                effects[effect as usize] = share;
+            });
+        }
+        effects
+    }
+
+    /// The level over a value, and its decimal logarithm; `None` of a value that is not positive.
+    #[inline(always)]
+    fn bright(&self, shape: &Shape) -> Option<[f64; 2]> {
+        // What is known of linearity needs no more digits than single precision has.
+        let log = |value: f64| f64::from((value as f32).max(f32::MIN_POSITIVE).natural_log());
+        (shape.value > 0.0).then(|| {
+            let log = std::f64::consts::LOG10_E * log(shape.value);
+            [self.level / shape.value, self.level_log - log]
+        })
+    }
+
+    /// Gives each effect its share, of a positive value.
+    #[inline(always)]
+    fn each(
+        &self,
+        light: &Slant,
+        view: &Slant,
+        shape: &Shape,
+        [bright, bright_log]: [f64; 2],
+        to: &mut impl FnMut(Effect, f64),
+    ) {
         let Shape {
             value,
             slopes,
             bends,
             surround,
         } = *shape;
-        if value.is_nan() || value <= 0.0 {
-            return [0.0; EFFECTS];
-        }
         let per_value = 1.0 / value;
-        let mut effects = [0.0; EFFECTS];
         let mut set = |effect: Effect, sensitivity: f64| {
-            effects[effect as usize] = self.inputs[effect as usize] * sensitivity;
+            to(effect, self.inputs[effect as usize] * sensitivity);
         };
         let mut light_slope = slopes[0] * per_value;
         if self.is_absolute {
@@ -289,8 +333,7 @@ impl Equation {
             // No reference at the same pose takes the light's cosine out.
             light_slope -= light.slope;
         }
-        let bright = self.level * per_value;
-        set(Effect::Linearity, -bright.decimal_log());
+        set(Effect::Linearity, -bright_log);
         set(Effect::Offset, (bright - 1.0) * light.per_cosine);
         // Of the sample, less what the reference (else the mean of the samples) has, over the part of the frame that
         // shows them.
@@ -306,7 +349,6 @@ impl Equation {
         set(Effect::Lens, bends[1]);
         let over_patch = self.patch[0] * bends[0] + self.patch[1] * bends[1];
         set(Effect::Patch, over_patch);
-        effects
     }
 }
 
