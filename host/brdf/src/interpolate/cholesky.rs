@@ -53,24 +53,30 @@ impl Columns {
     }
 
     /// `L⁻¹ b` of a factor's first `n` rows for `P` vectors of right-hand sides, which stand row by row in `b` and are
-    /// replaced. [`PANEL`] rows at a time take what the rows above give them while their sums stay in registers.
+    /// replaced. `R` rows at a time take what the rows above give them while their sums stay in registers: `n` is to be a
+    /// multiple of it.
     #[inline(always)]
-    pub fn solve<S: Simd, const P: usize>(&self, simd: S, n: usize, b: &mut [[S::f32s; P]]) {
+    pub fn solve<S: Simd, const R: usize, const P: usize>(
+        &self,
+        simd: S,
+        n: usize,
+        b: &mut [[S::f32s; P]],
+    ) {
         let zero = simd.splat_f32s(0.0);
-        for i in (0..n).step_by(PANEL) {
+        for i in (0..n).step_by(R) {
             let (above, rest) = b.split_at_mut(i);
-            let panel = &mut rest[..PANEL];
-            let mut sums = [[zero; P]; PANEL];
+            let panel = &mut rest[..R];
+            let mut sums = [[zero; P]; R];
             for (column, x) in self.data.chunks_exact(self.rows).zip(above.iter()) {
-                let l = &column[i..i + PANEL];
-                for r in 0..PANEL {
+                let l = &column[i..i + R];
+                for r in 0..R {
                     let l = simd.splat_f32s(l[r]);
                     for p in 0..P {
                         sums[r][p] = simd.mul_add_e_f32s(l, x[p], sums[r][p]);
                     }
                 }
             }
-            for r in 0..PANEL {
+            for r in 0..R {
                 for c in 0..r {
                     let l = simd.splat_f32s(self.column(i + c)[i + r]);
                     for p in 0..P {
@@ -225,7 +231,7 @@ mod tests {
         fn with_simd<S: Simd>(self, simd: S) -> usize {
             let (vectors, _) = S::as_mut_simd_f32s(self.2);
             let (pairs, _) = vectors.as_chunks_mut::<2>();
-            self.0.solve(simd, self.1, pairs);
+            self.0.solve::<S, 4, 2>(simd, self.1, pairs);
             2 * S::F32_LANES
         }
     }

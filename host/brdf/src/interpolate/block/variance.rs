@@ -14,8 +14,10 @@ fn kriging_variance(own: f32, uu: f32, zu: f32, zz: f32) -> f32 {
     (own - uu).max(0.0) + (1.0 - zu).powi(2) / zz.max(1e-12)
 }
 
-/// Vectors of places that are solved together: with four rows of the factor their sums stay in registers.
+/// Vectors of places that are solved together …
 const TOGETHER: usize = 2;
+/// … for four rows of the factor at a time, or one for eight: eight sums stay in registers, and none waits for another.
+const SUMS: usize = 8;
 
 /// Appends the variances at places, channel by channel.
 pub(super) struct Variance<'a, K, const N: usize> {
@@ -42,17 +44,24 @@ impl<K: Kernel, const N: usize> WithSimd for Variance<'_, K, N> {
         let rest = self.places.len() % wide;
         let (many, few) = self.places.split_at(self.places.len() - rest);
         for places in many.chunks_exact(wide) {
-            variances::<K, S, N, TOGETHER>(self.kernel, simd, s, places, zz, self.out);
+            variances::<K, S, N, { SUMS / TOGETHER }, TOGETHER>(
+                self.kernel,
+                simd,
+                s,
+                places,
+                zz,
+                self.out,
+            );
         }
         for places in few.chunks(S::F32_LANES) {
-            variances::<K, S, N, 1>(self.kernel, simd, s, places, zz, self.out);
+            variances::<K, S, N, SUMS, 1>(self.kernel, simd, s, places, zz, self.out);
         }
     }
 }
 
-/// Appends the variances at no more places than `P` vectors hold.
+/// Appends the variances at no more places than `P` vectors hold, by `R` rows of the factor at a time.
 #[inline(always)]
-fn variances<K: Kernel, S: Simd, const N: usize, const P: usize>(
+fn variances<K: Kernel, S: Simd, const N: usize, const R: usize, const P: usize>(
     kernel: &K,
     simd: S,
     s: &mut Process<N>,
@@ -102,7 +111,7 @@ fn variances<K: Kernel, S: Simd, const N: usize, const P: usize>(
             u[j][p] = simd.mul_add_e_f32s(slope, drifts[p], k[p]);
         }
     }
-    s.matrix.solve::<S, P>(simd, padded, u);
+    s.matrix.solve::<S, R, P>(simd, padded, u);
     let mut sums = [[simd.splat_f32s(0.0); P]; 2];
     for j in 0..n {
         let one = simd.splat_f32s(s.matrix.column(j)[ones]);

@@ -19,7 +19,7 @@ use super::block::Block;
 use super::block::kernel::{AnyKernel, NewBlock};
 use super::coordinates::Point;
 use super::datum::Datum;
-use super::from_corners::FromCorners;
+use super::from_corners::{FromCorners, weights_of};
 use super::hierarchy::{Detail, Found, Neighbours, keep_nearest};
 use super::patches::Patch;
 use crate::direction::Vec3;
@@ -131,11 +131,19 @@ impl<const N: usize> Refiner<N> {
             return self.solved(false, Some(refined));
         }
         let is_smooth = self.follows_from_corners(settings, pair);
-        if !is_smooth || with_variances {
-            write_places(settings, pair, &mut self.places);
-            self.coarse.evaluate(&self.places, &mut self.logs);
+        match weights_of(pair.0, pair.1) {
+            Some(weights) if is_smooth && with_variances => {
+                let cells = (pair.0.directions.len(), pair.1.directions.len());
+                self.from_corners.write(weights, cells, &mut self.logs);
+            }
+            _ if is_smooth => {}
+            _ => {
+                write_places(settings, pair, &mut self.places);
+                self.coarse.evaluate(&self.places, &mut self.logs);
+            }
         }
         if with_variances {
+            write_places(settings, pair, &mut self.places);
             self.coarse.variances_at(&self.places, &mut self.variances);
         }
         self.solved(is_smooth, None)
