@@ -196,7 +196,7 @@ impl Fill {
             uncertainty = uncertainty_rows(&file, &bars, budget.as_ref());
             let combine = budget.as_ref().and_then(|budget| {
                 error_facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
-                combine_errors(file.grid, &file.planes, budget)
+                combine_errors(file.grid, &file.planes, &bars.origin, budget)
             });
             let combine = combine
                 .as_ref()

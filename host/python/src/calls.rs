@@ -209,7 +209,7 @@ fn combined(
     errors: &ChannelErrors,
     budget: &gonia_rig::Budget,
 ) -> Option<Vec<Vec<f32>>> {
-    let combine = combine_errors(file.grid, &file.planes, budget)?;
+    let combine = combine_errors(file.grid, &file.planes, &errors.origin, budget)?;
     let side = file.grid.n_directions();
     let rows: Vec<Vec<Vec<f32>>> = (0..side)
         .into_par_iter()

@@ -107,7 +107,7 @@ impl Dense {
         run_silently(py, || {
             let combine = budget.as_ref().and_then(|budget| {
                 facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
-                combine_errors(self.file.grid, &self.file.planes, budget)
+                combine_errors(self.file.grid, &self.file.planes, &noise.origin, budget)
             });
             let combine = combine.as_ref().map(|of| of as &CombineErrors<'_>);
             let (grid, scale) = (self.file.grid, self.file.scale);

@@ -327,7 +327,7 @@ impl Run {
         facts.insert(ERRORS_OF.to_owned(), checksum::of_brdf(&dense.brdf));
         facts.insert(UNCERTAINTIES.to_owned(), budget.to_string());
         let path = self.path(ERRORS);
-        let combine = combine_errors(grid, planes, budget);
+        let combine = combine_errors(grid, planes, &errors.origin, budget);
         let combine = combine.as_ref().map(|of| of as &CombineErrors<'_>);
         self.progress.stage("writing the error bars", |_| {
             write_error_bars(&path, grid, errors, combine, dense.scale, &facts)

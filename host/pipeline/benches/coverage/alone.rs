@@ -1,5 +1,5 @@
-//! Sessions that have one error alone, beside the same sessions without it: noise and interpolation cancel in their ratio,
-//! so that what the error changes is seen by itself.
+//! Sessions that have one error alone, beside the same sessions without it: noise and interpolation nearly cancel in their
+//! ratio, so that the size of what the error changes is seen. Whether U is true is seen beside the true values.
 
 use crate::session::{Errors, Session, nominal, with_directions_off};
 use gonia_brdf::model::{Brdf, Ggx};
@@ -12,38 +12,83 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// An error is so many times what is stated: it must show. A reference that is tilted or raised by so much is noticed, and
-/// its frames are refused: such errors are as stated.
-fn scale(input: Input) -> f64 {
-    match input {
-        Input::ReferenceTilt | Input::ReferenceHeight => 1.0,
-        _ => 4.0,
+/// A session in which an input's error shows.
+struct Case {
+    input: Input,
+    /// The error is so many times what the bench states otherwise, and its rig states so much.
+    scale: f64,
+    poses: usize,
+    material: Ggx,
+}
+
+impl Case {
+    /// In samples: nothing hides it there. Of a reference that is tilted or raised by more than stated, frames are refused.
+    fn of_samples(input: Input) -> Self {
+        let as_stated = [Input::ReferenceTilt, Input::ReferenceHeight].contains(&input);
+        Self {
+            input,
+            scale: if as_stated { 1.0 } else { 4.0 },
+            poses: 60,
+            material: BROAD,
+        }
+    }
+
+    /// In cells, beside noise and interpolation.
+    fn of_cells(input: Input) -> Self {
+        let (scale, poses, material) = match input {
+            Input::ReferenceTilt => (2.0, 120, matte(0.6)),
+            Input::ReferenceHeight => (8.0, 60, matte(0.6)),
+            Input::Drift => (8.0, 60, BROAD),
+            Input::StrayLight => (16.0, 60, matte(0.04)),
+            Input::LightDirection | Input::ViewDirection => (8.0, 120, BROAD),
+            // Cones of the same angle: a panel instead of a lamp.
+            Input::LightDiameter => (8.0, 120, BROAD),
+            Input::LensDiameter => (13.0, 120, BROAD),
+            _ => (4.0, 60, BROAD),
+        };
+        Self {
+            input,
+            scale,
+            poses,
+            material,
+        }
+    }
+
+    /// The errors of a session that has this one.
+    fn errors(&self) -> Errors {
+        Errors::one(self.input, self.scale, SIZES)
     }
 }
+
 /// Of these standard uncertainties, along and across.
 const SIZES: [f64; 2] = [1.0, -1.5];
-/// Fewer poses determine cells less well.
-const POSES: usize = 60;
 /// Coarse enough to be quick, fine enough for the slopes of the material.
 const STEP_DEG: f64 = 6.0;
 const SEED: u64 = 77;
 
-/// Dark with a broad lobe: black level, stray light, the camera's curve and directions all change it.
-fn material() -> Arc<dyn Brdf> {
-    Arc::new(Ggx {
-        diffuse: [0.04; 3],
-        specular: [1.0; 3],
-        f0: 0.08,
-        alpha_x: 0.5,
-        alpha_y: 0.4,
-        azimuth_deg: 65.0,
-    })
+/// Dark with a broad lobe: black level, stray light, the camera's curve, directions and cones all change it.
+const BROAD: Ggx = Ggx {
+    diffuse: [0.04; 3],
+    specular: [1.0; 3],
+    f0: 0.08,
+    alpha_x: 0.5,
+    alpha_y: 0.4,
+    azimuth_deg: 65.0,
+};
+
+/// Interpolated best, so that what changes it by little shows.
+fn matte(rho: f64) -> Ggx {
+    Ggx {
+        diffuse: [rho; 3],
+        specular: [0.0; 3],
+        ..BROAD
+    }
 }
 
-/// A session's samples.
-fn sampled(errors: Errors, scale: f64) -> (Vec<Sample>, Budget) {
-    let rig = nominal(scale);
-    let session = Session::new(&rig, material(), errors, (SEED, POSES));
+/// The samples of a session.
+fn sampled(case: &Case, errors: Errors) -> (Vec<Sample>, Budget) {
+    let rig = nominal(case.scale);
+    let session = Session::new(&rig, Arc::new(case.material), errors, (SEED, case.poses));
     let go = &|_, _| ControlFlow::Continue(());
     let mut done = process(&rig, &session, &Masks::default(), go).expect("frames are sound");
     with_directions_off(&mut done.samples, &session.errors);
@@ -51,15 +96,20 @@ fn sampled(errors: Errors, scale: f64) -> (Vec<Sample>, Budget) {
     (done.samples, budget)
 }
 
-/// A session's cells.
-fn filled(errors: Errors, scale: f64, with_errors: bool) -> (Filled, Budget) {
-    let (samples, budget) = sampled(errors, scale);
+/// Its cells, and a budget that holds the case's input alone.
+fn filled(case: &Case, errors: Errors) -> (Filled, Budget) {
+    let (samples, budget) = sampled(case, errors);
     let options = FillOptions {
-        with_errors,
+        with_errors: true,
         ..FillOptions::with_step_deg(STEP_DEG)
     };
     let filled = fill(samples, Scale::Absolute, &options, &silent).expect("samples are enough");
-    (filled, budget)
+    let others = Input::ALL.into_iter().filter(|other| *other != case.input);
+    (filled, others.fold(budget, |of, other| of.with(other, 0.0)))
+}
+
+fn without_error() -> Errors {
+    Errors::one(Input::Reference, 0.0, [0.0; 2])
 }
 
 /// What an error does.
@@ -69,93 +119,61 @@ pub struct Alone {
     pub ratio: f64,
     /// Share of the changes' sum of squares that the budget's effects explain.
     pub explained: f64,
-    /// Share of the cells whose change lies within U (k = 2) of the noise and this input …
+    /// Share of the cells whose true value lies within U (k = 2) of noise, interpolation and this input …
     pub within: f64,
-    /// … and of the noise alone: of cells in which the budget says that the error is more than the noise.
+    /// … and of noise and interpolation alone: of cells in which the budget says that the error is more than these.
     pub left_out: f64,
     /// How many cells those are.
     pub shown_by: usize,
 }
 
-/// A session without errors, which others are compared with.
-pub struct Baseline {
-    filled: Filled,
-    budget: Budget,
-    cells: Vec<usize>,
-}
-
-impl Baseline {
-    /// Of noise alone.
-    pub fn new() -> Self {
-        let (filled, budget) = filled(Errors::one(Input::Reference, 0.0, [0.0; 2]), 1.0, true);
-        let grid = filled.dense.grid;
-        let origin = &filled.errors.as_ref().expect("asked for").origin;
-        let cells = cells(grid).filter(|cell| origin[*cell] != 3).collect();
-        Self {
-            filled,
-            budget,
-            cells,
+/// What an error of one input does, in a session that has it beside one that has not.
+pub fn with_error_of(input: Input) -> Alone {
+    let case = Case::of_cells(input);
+    let (sound, _) = filled(&case, without_error());
+    let (found, alone) = filled(&case, case.errors());
+    let grid = found.dense.grid;
+    let [before, plane] = [&sound, &found].map(|of| &of.dense.planes[1]);
+    let [first, errors] = [&sound, &found].map(|of| of.errors.as_ref().expect("asked for"));
+    let (noise, origin) = (&errors.standard_error[1], &errors.origin);
+    let cells = CellUncertainty::new(grid, plane, origin, &alone).expect("its own plane");
+    // Normal equations of the changes over the input's effects, at most two.
+    let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
+    let (mut within, mut left_out, mut shows) = (0.0f64, 0.0, 0.0f64);
+    for cell in one_of_each_pair(grid).filter(|cell| origin[*cell] != 3 && first.origin[*cell] != 3)
+    {
+        let (light, view) = grid.light_and_view(cell);
+        let value = f64::from(plane[cell]);
+        let change = value / f64::from(before[cell]) - 1.0;
+        let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
+        let off = (case.material.eval(i, v)[1] / value - 1.0).abs();
+        let effects = cells.effects(light, view);
+        let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
+        let stated: Vec<f64> = of_input.clone().map(|effect| effects.of(effect)).collect();
+        let scatter = (f64::from(noise[cell]) / value).powi(2);
+        // Cells count by how well noise and interpolation let them be known.
+        let weight = 1.0 / scatter.max(1e-8);
+        let pair = [stated[0], stated.get(1).copied().unwrap_or(0.0)];
+        for j in 0..2 {
+            xy[j] += weight * pair[j] * change;
+            (0..2).for_each(|k| xx[j][k] += weight * pair[j] * pair[k]);
+        }
+        yy += weight * change * change;
+        let u: f64 = of_input.map(|effect| effects.square(effect)).sum();
+        if u > scatter {
+            shows += 1.0;
+            within += f64::from(off <= 2.0 * (u + scatter).sqrt());
+            left_out += f64::from(off <= 2.0 * scatter.sqrt());
         }
     }
-
-    /// What an error of one input changes.
-    pub fn with_error_of(&self, input: Input) -> Alone {
-        let grid = self.filled.dense.grid;
-        let scale = scale(input);
-        let (found, _) = filled(Errors::one(input, scale, SIZES), scale, false);
-        let plane = &self.filled.dense.planes[1];
-        let noise = &self
-            .filled
-            .errors
-            .as_ref()
-            .expect("asked for")
-            .standard_error[1];
-        let alone = Input::ALL
-            .into_iter()
-            .fold(self.budget.clone(), |of, other| {
-                if other == input {
-                    let stated = of.value(input);
-                    of.with(other, scale * stated)
-                } else {
-                    of.with(other, 0.0)
-                }
-            });
-        let cells = CellUncertainty::new(grid, plane, &alone).expect("its own plane");
-        // Normal equations of the changes over the input's effects, at most two.
-        let (mut xx, mut xy, mut yy) = ([[0.0; 2]; 2], [0.0; 2], 0.0);
-        let (mut within, mut left_out, mut shows) = (0.0f64, 0.0, 0.0f64);
-        for cell in &self.cells {
-            let (light, view) = grid.light_and_view(*cell);
-            let value = f64::from(plane[*cell]);
-            let change = f64::from(found.dense.planes[1][*cell]) / value - 1.0;
-            let effects = cells.effects(light, view);
-            let of_input = Effect::ALL.into_iter().filter(|e| e.input() == Some(input));
-            let stated: Vec<f64> = of_input.clone().map(|effect| effects.of(effect)).collect();
-            let scatter = (f64::from(noise[*cell]) / value).powi(2);
-            // Cells count by how well noise and interpolation let them be known.
-            let weight = 1.0 / scatter.max(1e-8);
-            let pair = [stated[0], stated.get(1).copied().unwrap_or(0.0)];
-            for j in 0..2 {
-                xy[j] += weight * pair[j] * change;
-                (0..2).for_each(|k| xx[j][k] += weight * pair[j] * pair[k]);
-            }
-            yy += weight * change * change;
-            let u: f64 = of_input.map(|effect| effects.square(effect)).sum();
-            if u > scatter {
-                shows += 1.0;
-                within += f64::from(change.abs() <= 2.0 * (u + scatter).sqrt());
-                left_out += f64::from(change.abs() <= 2.0 * scatter.sqrt());
-            }
-        }
-        let sizes = solved(xx, xy);
-        let size = |of: [f64; 2]| of[0].hypotenuse(of[1]);
-        Alone {
-            ratio: size(sizes) / size(true_sizes(input)),
-            explained: (sizes[0] * xy[0] + sizes[1] * xy[1]) / yy,
-            within: within / shows.max(1.0),
-            left_out: left_out / shows.max(1.0),
-            shown_by: shows as usize,
-        }
+    let sizes = solved(xx, xy);
+    let size = |of: [f64; 2]| of[0].hypotenuse(of[1]);
+    Alone {
+        ratio: size(sizes) / size(true_sizes(input)),
+        explained: (sizes[0] * xy[0] + sizes[1] * xy[1]) / yy,
+        within: within / shows.max(1.0),
+        left_out: left_out / shows.max(1.0),
+        shown_by: shows as usize,
     }
 }
 
@@ -164,9 +182,9 @@ impl Baseline {
 /// session without and with it.
 #[allow(dead_code)] // The bench counts cells alone.
 pub fn samples_with_error_of(input: Input) -> (f64, f64, [usize; 2]) {
-    let scale = scale(input);
-    let (sound, budget) = sampled(Errors::one(input, 0.0, [0.0; 2]), scale);
-    let (off, _) = sampled(Errors::one(input, scale, SIZES), scale);
+    let case = Case::of_samples(input);
+    let (sound, budget) = sampled(&case, without_error());
+    let (off, _) = sampled(&case, case.errors());
     let equation = Equation::new(&budget);
     let mut frames: HashMap<u32, [f64; 2]> = HashMap::new();
     for sample in &sound {
@@ -184,8 +202,7 @@ pub fn samples_with_error_of(input: Input) -> (f64, f64, [usize; 2]) {
         let [sum, count] = frames[&sample.frame];
         let light = Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into());
         let view = Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into());
-        let material = material();
-        let at = |(i, v): (Direction, Direction)| material.eval(i.to_vec3(), v.to_vec3())[1];
+        let at = |(i, v): (Direction, Direction)| case.material.eval(i.to_vec3(), v.to_vec3())[1];
         let shape = Shape {
             value,
             surround: sum / count,
@@ -264,10 +281,10 @@ fn solved(m: [[f64; 2]; 2], b: [f64; 2]) -> [f64; 2] {
 }
 
 /// One cell of each pair of directions that exchange, without a pole's repeats.
-fn cells(grid: Grid) -> impl Iterator<Item = usize> {
+fn one_of_each_pair(grid: Grid) -> impl Iterator<Item = usize> {
     (0..grid.n_cells()).filter(move |cell| {
         let (light, view) = grid.light_and_view(*cell);
         let repeats = |d: usize| (1..grid.n_phi()).contains(&d);
-        !repeats(light) && !repeats(view)
+        light <= view && !repeats(light) && !repeats(view)
     })
 }

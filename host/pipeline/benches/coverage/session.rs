@@ -106,8 +106,9 @@ struct OverCones {
 
 impl Brdf for OverCones {
     fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
-        // Rings of a disc with the same second moments as the disc: r²/2 of each component's square, twice.
-        let about = |d: Vec3, radius: f64| -> Vec<Vec3> {
+        // Four places on the rim of one disc or of the other, each pair as often as any: of both discs together they have the
+        // second moments, r²/4 of each component, and no first or third ones.
+        let rim = |d: Vec3, radius: f64| -> [Vec3; 4] {
             let across = [-d[1], d[0], 0.0];
             let flat = across[0].hypotenuse(across[1]);
             let across = if flat > 1e-9 {
@@ -120,22 +121,17 @@ impl Brdf for OverCones {
                 -across[0] * d[2],
                 across[0] * d[1] - across[1] * d[0],
             ];
-            (0..6)
-                .map(|k| {
-                    let (s, c) = (f64::from(k) * std::f64::consts::FRAC_PI_3).sine_cosine();
-                    let r = radius / 2f64.sqrt();
-                    let to = [0, 1, 2].map(|j| d[j] + r * (c * along[j] + s * across[j]));
-                    gonia_brdf::direction::normalize(to)
-                })
-                .collect()
+            [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]].map(|[c, s]| {
+                let to = [0, 1, 2].map(|j| d[j] + radius * (c * along[j] + s * across[j]));
+                gonia_brdf::direction::normalize(to)
+            })
         };
-        let (lights, views) = (about(light, self.radius[0]), about(view, self.radius[1]));
+        let lights = rim(light, self.radius[0]).map(|light| (light, view));
+        let views = rim(view, self.radius[1]).map(|view| (light, view));
         let mut sum = [0.0; 3];
-        for light in &lights {
-            for view in &views {
-                let value = self.of.eval(*light, *view);
-                (0..3).for_each(|c| sum[c] += value[c] / 36.0);
-            }
+        for (light, view) in lights.into_iter().chain(views) {
+            let value = self.of.eval(light, view);
+            (0..3).for_each(|c| sum[c] += value[c] / 8.0);
         }
         sum
     }

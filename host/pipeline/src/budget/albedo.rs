@@ -1,9 +1,9 @@
 //! The uncertainty of a directional albedo: one error acts in all cells, so that each effect is summed with its sign.
 
 use crate::budget::equation::{Effect, Effects};
+use crate::budget::patches::Patches;
 use crate::budget::summary::CellBudget;
 use crate::warnings::ring_weights;
-use gonia_brdf::{Elementary, Grid};
 
 /// Errors of noise and interpolation are one within so many degrees, and independent beyond: as for fits.
 const PATCH_DEG: f64 = 30.0;
@@ -28,8 +28,8 @@ pub fn albedo_uncertainty(cells: &CellBudget<'_>, theta_i_deg: f64) -> AlbedoUnc
     let weights = ring_weights(grid.n_theta(), n_phi, step_deg);
     let ring = ((theta_i_deg / step_deg).round() as usize).min(grid.n_theta() - 1);
     let (mut albedo, mut effects) = (0.0, Effects::default());
-    let views = Patches::of(grid);
-    let lights = Patches::sectors(ring as f64 * step_deg);
+    let views = Patches::of(grid, PATCH_DEG);
+    let lights = Patches::sectors(ring as f64 * step_deg, PATCH_DEG);
     let mut noise = vec![0.0; lights * views.count];
     let azimuths = AZIMUTHS.min(n_phi);
     for k in 0..azimuths {
@@ -56,50 +56,11 @@ pub fn albedo_uncertainty(cells: &CellBudget<'_>, theta_i_deg: f64) -> AlbedoUnc
     }
 }
 
-/// Patches of directions about as wide as [`PATCH_DEG`].
-struct Patches {
-    n_phi: usize,
-    step_deg: f64,
-    /// Of each band of polar angles the number of its first patch, and how many it has.
-    bands: Vec<(usize, usize)>,
-    count: usize,
-}
-
-impl Patches {
-    fn of(grid: Grid) -> Self {
-        let last_deg = (grid.n_theta() - 1) as f64 * grid.step_deg();
-        let (mut bands, mut count) = (Vec::new(), 0);
-        for band in 0..=(last_deg / PATCH_DEG) as usize {
-            let sectors = Self::sectors((band as f64 + 0.5) * PATCH_DEG);
-            bands.push((count, sectors));
-            count += sectors;
-        }
-        Self {
-            n_phi: grid.n_phi(),
-            step_deg: grid.step_deg(),
-            bands,
-            count,
-        }
-    }
-
-    /// How many patches lie around at a polar angle.
-    fn sectors(theta_deg: f64) -> usize {
-        let around = 360.0 / PATCH_DEG * theta_deg.to_radians().sine();
-        (around.round() as usize).max(1)
-    }
-
-    fn of_direction(&self, index: usize) -> usize {
-        let (ring, phi) = (index / self.n_phi, index % self.n_phi);
-        let band = (ring as f64 * self.step_deg / PATCH_DEG) as usize;
-        let (first, sectors) = self.bands[band.min(self.bands.len() - 1)];
-        first + phi * sectors / self.n_phi
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::budget::summary::Holding;
+    use gonia_brdf::Grid;
     use gonia_rig::{Budget, Input, KnownFrom, ReferenceCalibration};
 
     const RHO: f64 = 0.6;

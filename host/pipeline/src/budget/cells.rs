@@ -1,9 +1,11 @@
 //! The measurement equation at every cell of a dense BRDF, and at any pair of directions of what can be asked.
 
 use crate::budget::equation::{Effects, Equation, Shape, Slant};
+use crate::budget::sides::Sides;
 use gonia_brdf::{Direction, Elementary, Grid};
 use gonia_formats::dense::ErrorRow;
 use gonia_rig::Budget;
+use std::sync::Arc;
 
 /// How far apart directions are whose values give slopes, degrees, at least.
 const STEP_DEG: f64 = 2.0;
@@ -34,31 +36,46 @@ pub struct CellUncertainty<'a> {
     plane: &'a [f32],
     equation: Equation,
     nodes: Vec<Node>,
+    sides: Arc<Sides>,
 }
 
 impl<'a> CellUncertainty<'a> {
-    /// Over a plane of `grid.n_cells()` values; `None` where it is not of this size.
-    pub fn new(grid: Grid, plane: &'a [f32], budget: &Budget) -> Option<Self> {
+    /// Over a plane of `grid.n_cells()` values; `None` where it is not of this size. `origins`
+    /// ([`Origin`](gonia_brdf::interpolate::Origin), in the grid's order; an empty list where they are not known) say on which side
+    /// of each cell its samples lie.
+    pub fn new(grid: Grid, plane: &'a [f32], origins: &[u8], budget: &Budget) -> Option<Self> {
+        Self::with_sides(grid, plane, Arc::new(Sides::of(grid, origins)), budget)
+    }
+
+    fn with_sides(
+        grid: Grid,
+        plane: &'a [f32],
+        sides: Arc<Sides>,
+        budget: &Budget,
+    ) -> Option<Self> {
         (plane.len() == grid.n_cells()).then(|| Self {
             grid,
             plane,
             equation: Equation::new(budget),
             nodes: (0..grid.n_directions()).map(|k| node(grid, k)).collect(),
+            sides,
         })
     }
 
     /// The effects at a cell, by the indices of its light and view. The table is reciprocal, as every fill is.
     pub fn effects(&self, light: usize, view: usize) -> Effects {
         let shape = self.shape(light, view);
-        let (light, view) = (&self.nodes[light].slant, &self.nodes[view].slant);
-        self.equation.of_reciprocal(light, view, &shape)
+        let slants = (&self.nodes[light].slant, &self.nodes[view].slant);
+        let there = self.sides.there(light, view);
+        self.equation.of_reciprocal(slants, &shape, there)
     }
 
-    /// The squares of the relative standard uncertainties of scale and direction at a cell.
-    fn squares(&self, light: usize, view: usize) -> [f64; 2] {
+    /// The squares of the relative standard uncertainties of scale and direction at a cell whose value comes by a share from
+    /// samples at its own light and view.
+    fn squares(&self, light: usize, view: usize, there: f64) -> [f64; 2] {
         let shape = self.shape(light, view);
-        let (light, view) = (&self.nodes[light].slant, &self.nodes[view].slant);
-        self.equation.squares(light, view, &shape)
+        let slants = (&self.nodes[light].slant, &self.nodes[view].slant);
+        self.equation.squares(slants, &shape, there)
     }
 
     #[inline(always)]
@@ -90,15 +107,18 @@ impl<'a> CellUncertainty<'a> {
     }
 }
 
-/// Combines the standard errors of a dense BRDF's planes, of noise and interpolation with its budget, a row of light at a time.
-/// `None` where a plane is not of the grid's size.
+/// Combines the standard errors of a dense BRDF's planes, of noise and interpolation with its budget, a row of light at a time;
+/// `origins` are those of its cells, as of [`CellUncertainty::new`]. `None` where a plane is not of the grid's size.
 pub fn combine_errors<'a>(
     grid: Grid,
     planes: &'a [Vec<f32>],
+    origins: &[u8],
     budget: &Budget,
 ) -> Option<impl Fn(usize, &[&[f32]]) -> ErrorRow + Sync + use<'a>> {
     let side = grid.n_directions();
-    let of_channel = |plane: &'a Vec<f32>| CellUncertainty::new(grid, plane, budget);
+    let sides = Arc::new(Sides::of(grid, origins));
+    let of_channel =
+        |plane: &'a Vec<f32>| CellUncertainty::with_sides(grid, plane, sides.clone(), budget);
     let channels: Vec<CellUncertainty<'a>> =
         planes.iter().map(of_channel).collect::<Option<_>>()?;
     let share = 1.0 / channels.len().max(1) as f64;
@@ -107,6 +127,7 @@ pub fn combine_errors<'a>(
             combined: Vec::with_capacity(channels.len()),
             parts: [(); 3].map(|()| vec![0.0; side]),
         };
+        let there = sides.row(light, side);
         for (cells, noise) in channels.iter().zip(noise) {
             let values = &cells.plane[light * side..(light + 1) * side];
             let combined = values
@@ -115,7 +136,8 @@ pub fn combine_errors<'a>(
                 .enumerate()
                 .map(|(view, (value, noise))| {
                     let (value, noise) = (f64::from(*value), f64::from(*noise));
-                    let [scale, direction] = cells.squares(light, view);
+                    let there = f64::from(there[view]);
+                    let [scale, direction] = cells.squares(light, view, there);
                     let shares = [
                         if value > 0.0 { noise / value } else { 0.0 },
                         direction.sqrt(),
@@ -317,14 +339,14 @@ mod tests {
                     plane[row * n + view] = at((d, grid.direction(view))) as f32;
                 }
             }
-            let cells = CellUncertainty::new(grid, &plane, &budget()).unwrap();
+            let cells = CellUncertainty::new(grid, &plane, &[], &budget()).unwrap();
             for [tv, pv] in [[30.0, 200.0], [0.0, 44.0], [2.0, 10.0], [66.0, 272.0]] {
                 let view = grid.n_phi() * (tv / 2.0) as usize + (pv / 2.0) as usize;
                 let by_cells = cells.effects(light, view);
                 let (i, v) = (grid.direction(light), grid.direction(view));
                 let shape = shape(&places(i, v).map(at));
                 let slants = (Slant::of(i), Slant::of(v));
-                let by_function = equation.of_reciprocal(&slants.0, &slants.1, &shape);
+                let by_function = equation.of_reciprocal((&slants.0, &slants.1), &shape, 0.5);
                 for part in [Part::Scale, Part::Direction] {
                     let (a, b) = (by_cells.u(part), by_function.u(part));
                     assert!((a - b).abs() < 0.06 * b, "{theta} {tv} {part:?} {a} {b}");
@@ -338,22 +360,23 @@ mod tests {
         let grid = Grid::with_step_deg(10.0).unwrap();
         let brdf = DenseBrdf::tabulate(grid, &BRDF);
         let plane = &brdf.planes()[0];
-        let cells = CellUncertainty::new(grid, plane, &budget()).unwrap();
+        let cells = CellUncertainty::new(grid, plane, &[], &budget()).unwrap();
         for light in [0, 5, grid.n_directions() - 1] {
             for view in 0..grid.n_directions() {
                 let effects = cells.effects(light, view);
                 for u in [Part::Direction, Part::Scale].map(|part| effects.u(part)) {
                     assert!(u.is_finite() && u > 0.0 && u < 1.0, "{light} {view} {u}");
                 }
+                let there = cells.sides.there(light, view);
                 let squares = [Part::Scale, Part::Direction].map(|part| effects.u(part).powi(2));
-                for (short, long) in cells.squares(light, view).iter().zip(squares) {
+                for (short, long) in cells.squares(light, view, there).iter().zip(squares) {
                     assert!(
-                        (short - long).abs() < 1e-12 * long,
+                        (short - long).abs() < 1e-9 * long,
                         "{light} {view} {short} {long}"
                     );
                 }
             }
         }
-        assert!(CellUncertainty::new(grid, &plane[1..], &budget()).is_none());
+        assert!(CellUncertainty::new(grid, &plane[1..], &[], &budget()).is_none());
     }
 }

@@ -104,28 +104,40 @@ impl Effect {
 }
 
 /// What the effects at a pair of directions change a value by, as shares of it, each for an error of one standard
-/// uncertainty, with its sign: of what is measured there, and of what is measured with light and view exchanged. A value of a
-/// reciprocal table follows from either or both, and nobody knows how much from which: its uncertainty is the root mean
-/// square of the two, which is right where it follows from one of them and cautious where from both.
+/// uncertainty, with its sign. A value of a reciprocal table comes from what is measured there and from what is measured
+/// with light and view exchanged. Where a share w comes from there, as far as is known, an effect is the mean w a +
+/// (1 − w) b of the changes a and b of both, and the spread √(w (1 − w)) (a − b) of these about it, since nobody knows w
+/// for certain: the sum of their squares is w a² + (1 − w) b², which is right where all comes from one of them and
+/// cautious where from both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects([[f64; EFFECTS]; 2]);
 
 impl Effects {
-    /// The share of one effect, the mean of both measurements.
-    pub fn of(&self, effect: Effect) -> f64 {
-        let [there, exchanged] = self.sides(effect);
-        0.5 * (there + exchanged)
+    /// Of the changes there and exchanged, the share `w` from there.
+    fn of_both([there, exchanged]: [[f64; EFFECTS]; 2], w: f64) -> Self {
+        let spread = (w * (1.0 - w)).max(0.0).sqrt();
+        let mut both = [[0.0; EFFECTS]; 2];
+        for k in 0..EFFECTS {
+            both[0][k] = w * there[k] + (1.0 - w) * exchanged[k];
+            both[1][k] = spread * (there[k] - exchanged[k]);
+        }
+        Self(both)
     }
 
-    /// The shares of one effect on what is measured there and with light and view exchanged.
-    pub fn sides(&self, effect: Effect) -> [f64; 2] {
-        self.0.map(|side| side[effect as usize])
+    /// The share of one effect, the mean of both measurements.
+    pub fn of(&self, effect: Effect) -> f64 {
+        self.0[0][effect as usize]
+    }
+
+    /// That share, and the spread about it.
+    pub fn mean_and_spread(&self, effect: Effect) -> [f64; 2] {
+        self.0.map(|of| of[effect as usize])
     }
 
     /// The square of the relative standard uncertainty by one effect.
     pub fn square(&self, effect: Effect) -> f64 {
-        let [there, exchanged] = self.sides(effect);
-        0.5 * (there * there + exchanged * exchanged)
+        let [mean, spread] = self.mean_and_spread(effect);
+        mean * mean + spread * spread
     }
 
     /// The relative standard uncertainty of a part.
@@ -133,11 +145,11 @@ impl Effects {
         // Those of the scale come first.
         let split = Effect::LightTheta as usize;
         let squares = |of: &[f64]| of.iter().map(|share| share * share).sum::<f64>();
-        let sides = self.0.each_ref().map(|side| match part {
-            Part::Scale => squares(&side[..split]),
-            Part::Direction => squares(&side[split..]),
+        let both = self.0.each_ref().map(|of| match part {
+            Part::Scale => squares(&of[..split]),
+            Part::Direction => squares(&of[split..]),
         });
-        (0.5 * (sides[0] + sides[1])).sqrt()
+        (both[0] + both[1]).sqrt()
     }
 
     /// Adds another's, effect by effect, times a weight: an error acts in all cells alike.
@@ -251,30 +263,42 @@ impl Equation {
         }
     }
 
-    /// The effects at a pair of directions of a BRDF that is made reciprocal: on what is measured there and with light and
+    /// The effects at a pair of directions of a BRDF that is made reciprocal, whose value comes by the share `there`
+    /// (0 ..= 1; one half where it is not known) from what is measured there, by the rest from what is measured with light and
     /// view exchanged.
-    pub fn of_reciprocal(&self, light: &Slant, view: &Slant, shape: &Shape) -> Effects {
-        let there = self.shares(light, view, shape);
-        Effects([there, self.shares(view, light, &shape.exchanged())])
+    pub fn of_reciprocal(
+        &self,
+        (light, view): (&Slant, &Slant),
+        shape: &Shape,
+        there: f64,
+    ) -> Effects {
+        let here = self.shares(light, view, shape);
+        let exchanged = self.shares(view, light, &shape.exchanged());
+        Effects::of_both([here, exchanged], there)
     }
 
     /// The effects on a value that was measured at a pair of directions; all zero of a value that is not positive, of which nothing is a share.
     pub fn at(&self, light: &Slant, view: &Slant, shape: &Shape) -> Effects {
-        Effects([self.shares(light, view, shape); 2])
+        Effects([self.shares(light, view, shape), [0.0; EFFECTS]])
     }
 
     /// The squares of the relative standard uncertainties of scale and direction ([`Effects::u`]) of what
     /// [`Self::of_reciprocal`] gives, without a list of the effects: a table has hundreds of millions of values.
-    pub fn squares(&self, light: &Slant, view: &Slant, shape: &Shape) -> [f64; 2] {
+    pub fn squares(&self, (light, view): (&Slant, &Slant), shape: &Shape, there: f64) -> [f64; 2] {
         let Some(bright) = self.bright(shape) else {
             return [0.0; 2];
         };
         let mut squares = [0.0; 2];
-        let mut add = |effect: Effect, share: f64| {
-            squares[usize::from(effect.part() == Part::Direction)] += 0.5 * share * share;
+        let mut add = |effect: Effect, share: f64, weight: f64| {
+            squares[usize::from(effect.part() == Part::Direction)] += weight * share * share;
         };
-        self.each(light, view, shape, bright, &mut add);
-        self.each(view, light, &shape.exchanged(), bright, &mut add);
+        self.each(light, view, shape, bright, &mut |effect, share| {
+            add(effect, share, there);
+        });
+        let exchanged = shape.exchanged();
+        self.each(view, light, &exchanged, bright, &mut |effect, share| {
+            add(effect, share, 1.0 - there);
+        });
         squares
     }
 
@@ -573,30 +597,25 @@ mod tests {
         };
         let equation = equation(ReferenceCalibration::KnownReference);
         let one = equation.at(&slants.0, &slants.1, &shape);
-        let both = equation.of_reciprocal(&slants.0, &slants.1, &shape);
-        let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
+        let of = |there| equation.of_reciprocal((&slants.0, &slants.1), &shape, there);
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs().max(1e-6);
         // The reference's error is the same in both; light from straight above does not show a tilt; the light stood where
         // the view is, and its error acts by the slope there.
-        assert!(close(both.of(Effect::Reference), one.of(Effect::Reference)));
         let tilt = one.of(Effect::ReferenceTiltX);
-        for (effect, sides) in [
+        let slopes = [0.4, -0.2].map(|slope| SMALL * slope / 0.3);
+        for (effect, [there, exchanged]) in [
+            (Effect::Reference, [one.of(Effect::Reference); 2]),
             (Effect::ReferenceTiltX, [tilt, 0.0]),
-            (
-                Effect::LightTheta,
-                [0.4, -0.2].map(|slope| SMALL * slope / 0.3),
-            ),
-            (
-                Effect::ViewTheta,
-                [-0.2, 0.4].map(|slope| SMALL * slope / 0.3),
-            ),
+            (Effect::LightTheta, slopes),
+            (Effect::ViewTheta, [slopes[1], slopes[0]]),
         ] {
-            let found = both.sides(effect);
-            assert!(
-                (0..2).all(|k| (found[k] - sides[k]).abs() < 1e-12),
-                "{effect:?} {found:?}"
-            );
-            let square = 0.5 * (sides[0].powi(2) + sides[1].powi(2));
-            assert!(close(both.square(effect), square), "{effect:?}");
+            for share in [0.0, 0.3, 0.5, 1.0] {
+                let both = of(share);
+                let mean = share * there + (1.0 - share) * exchanged;
+                assert!(close(both.of(effect), mean), "{effect:?} {share}");
+                let square = share * there.powi(2) + (1.0 - share) * exchanged.powi(2);
+                assert!(close(both.square(effect), square), "{effect:?} {share}");
+            }
         }
     }
 

@@ -7,8 +7,8 @@ use gonia_brdf::{DenseBrdf, Direction};
 use gonia_rig::Budget;
 
 /// Of each effect that changes anything, by which share of its value it changes each cell and channel: slopes are those
-/// of the dense BRDF at the nearest nodes. Each has two rows, for what is measured there and with light and view
-/// exchanged: half of the variance is that of either.
+/// of the dense BRDF at the nearest nodes. Each has two rows, for the mean of what is measured there and with light and
+/// view exchanged, and for the spread about it.
 pub(crate) fn shared_errors(
     dense: &DenseBrdf,
     budget: &Budget,
@@ -17,7 +17,7 @@ pub(crate) fn shared_errors(
     let grid = dense.grid();
     let planes = dense.planes().iter();
     let channels: Vec<CellUncertainty<'_>> = planes
-        .filter_map(|plane| CellUncertainty::new(grid, plane, budget))
+        .filter_map(|plane| CellUncertainty::new(grid, plane, &[], budget))
         .collect();
     let last = grid.n_directions() - 1;
     let node = |v| {
@@ -34,8 +34,8 @@ pub(crate) fn shared_errors(
         })
     };
     let all: Vec<[Effects; 3]> = cells.iter().map(of_cell).collect();
-    let of_side = |(effect, side): (Effect, usize)| -> Vec<[f64; 3]> {
-        let share = |of: &Effects| of.sides(effect)[side] * std::f64::consts::FRAC_1_SQRT_2;
+    let of_one = |(effect, which): (Effect, usize)| -> Vec<[f64; 3]> {
+        let share = |of: &Effects| of.mean_and_spread(effect)[which];
         let shares = |of: &[Effects; 3]| of.each_ref().map(share);
         all.iter().map(shares).collect()
     };
@@ -43,7 +43,7 @@ pub(crate) fn shared_errors(
     Effect::ALL
         .into_iter()
         .flat_map(|effect| [(effect, 0), (effect, 1)])
-        .map(of_side)
+        .map(of_one)
         .filter(changes)
         .collect()
 }

@@ -16,7 +16,8 @@
 //! Each input ([`Input`](gonia_rig::Input)) has a standard uncertainty, stated in `rig.toml`, found by the calibration, or a cautious
 //! default. [`Equation`] tells by which share each of these errors changes a value ([`Effect`]): an error of one
 //! standard uncertainty, with its sign, since one error acts in all cells. A cell of a reciprocal table has the
-//! effects at its directions or those with light and view exchanged: their root mean square. Effects are independent of each other;
+//! effects at its directions or those with light and view exchanged, by the shares in which samples lie on either side: the
+//! root of their mean square. Effects are independent of each other;
 //! the uncertainty of a cell is the root of their squares' sum, with that of noise and interpolation; that of a sum
 //! over cells follows from each effect's sum.
 //!
@@ -32,9 +33,11 @@ mod equation;
 mod fits;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod patches;
 mod poses;
 mod record;
 mod samples;
+mod sides;
 mod summary;
 
 pub use albedo::{AlbedoUncertainty, albedo_uncertainty};

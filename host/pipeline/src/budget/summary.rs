@@ -47,7 +47,7 @@ impl<'a> CellBudget<'a> {
     ) -> Option<Self> {
         let n = grid.n_cells();
         let fits = errors.len() == n && (origins.is_empty() || origins.len() == n);
-        let cells = CellUncertainty::new(grid, plane, budget).filter(|_| fits)?;
+        let cells = CellUncertainty::new(grid, plane, origins, budget).filter(|_| fits)?;
         Some(Self {
             cells,
             grid,

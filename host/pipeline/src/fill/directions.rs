@@ -121,7 +121,7 @@ impl FitOfSamples {
                     let known = equation.as_ref().map_or(0.0, |equation| {
                         let shape = shape(&about.map(|(value, _)| value[c]));
                         let (light, view) = (Slant::of(*light), Slant::of(*view));
-                        let effects = equation.of_reciprocal(&light, &view, &shape);
+                        let effects = equation.of_reciprocal((&light, &view), &shape, 0.5);
                         value
                             * effects
                                 .u(Part::Direction)
