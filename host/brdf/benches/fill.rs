@@ -56,6 +56,7 @@ impl Arguments {
             target_error: self.number("--target-error", preset.target_error.into()) as f32,
             budget: self.number("--budget", preset.budget.into()) as f32,
             neighbours: self.number("--neighbours", preset.neighbours as f64) as usize,
+            neighbours_most: self.number("--neighbours", preset.neighbours_most as f64) as usize,
             range: self.number("--range", preset.range.into()) as f32,
             nugget_min: self.number("--nugget", preset.nugget_min.into()) as f32,
             ..preset

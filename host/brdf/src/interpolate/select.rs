@@ -150,15 +150,15 @@ where
     }
 
     /// The best candidate with twice the data, where that could pay: a few poses choose their coordinates by other
-    /// blocks than they are filled with, a preview refines nothing, and of an error no larger than a sample's noise
-    /// little can be taken off.
+    /// blocks than they are filled with, and of an error no larger than a sample's noise little can be taken off.
     fn with_twice_the_data(&self, data: &Data<N>, best: &Candidate) -> Option<Candidate> {
+        let neighbours = 2 * best.settings.neighbours;
         let noise = f64::from(best.settings.noise_sigma());
-        if self.few || !best.settings.refines() || best.log_error <= noise {
+        if self.few || neighbours > best.settings.neighbours_most || best.log_error <= noise {
             return None;
         }
         let settings = FillSettings {
-            neighbours: 2 * best.settings.neighbours,
+            neighbours,
             ..best.settings
         };
         let log_error = self.error(data, &settings)?;
