@@ -35,7 +35,7 @@ pub struct CellUncertainty<'a> {
     grid: Grid,
     plane: &'a [f32],
     equation: Equation,
-    nodes: Vec<Node>,
+    nodes: Arc<[Node]>,
     sides: Arc<Sides>,
 }
 
@@ -44,12 +44,19 @@ impl<'a> CellUncertainty<'a> {
     /// ([`Origin`](gonia_brdf::interpolate::Origin), in the grid's order; an empty list where they are not known) say on which side
     /// of each cell its samples lie.
     pub fn new(grid: Grid, plane: &'a [f32], origins: &[u8], budget: &Budget) -> Option<Self> {
-        Self::with_sides(grid, plane, Arc::new(Sides::of(grid, origins)), budget)
+        Self::with_nodes(
+            grid,
+            plane,
+            nodes(grid),
+            Arc::new(Sides::of(grid, origins)),
+            budget,
+        )
     }
 
-    fn with_sides(
+    fn with_nodes(
         grid: Grid,
         plane: &'a [f32],
+        nodes: Arc<[Node]>,
         sides: Arc<Sides>,
         budget: &Budget,
     ) -> Option<Self> {
@@ -57,7 +64,7 @@ impl<'a> CellUncertainty<'a> {
             grid,
             plane,
             equation: Equation::new(budget),
-            nodes: (0..grid.n_directions()).map(|k| node(grid, k)).collect(),
+            nodes,
             sides,
         })
     }
@@ -116,43 +123,42 @@ pub fn combine_errors<'a>(
     budget: &Budget,
 ) -> Option<impl Fn(usize, &[&[f32]]) -> ErrorRow + Sync + use<'a>> {
     let side = grid.n_directions();
-    let sides = Arc::new(Sides::of(grid, origins));
-    let of_channel =
-        |plane: &'a Vec<f32>| CellUncertainty::with_sides(grid, plane, sides.clone(), budget);
+    let (nodes, sides) = (nodes(grid), Arc::new(Sides::of(grid, origins)));
+    let of_channel = |plane: &'a Vec<f32>| {
+        CellUncertainty::with_nodes(grid, plane, nodes.clone(), sides.clone(), budget)
+    };
     let channels: Vec<CellUncertainty<'a>> =
         planes.iter().map(of_channel).collect::<Option<_>>()?;
     let share = 1.0 / channels.len().max(1) as f64;
     Some(move |light: usize, noise: &[&[f32]]| {
         let mut row = ErrorRow {
-            combined: Vec::with_capacity(channels.len()),
+            combined: vec![Vec::with_capacity(side); channels.len()],
             parts: [(); 3].map(|()| vec![0.0; side]),
         };
-        let there = sides.row(light, side);
-        for (cells, noise) in channels.iter().zip(noise) {
-            let values = &cells.plane[light * side..(light + 1) * side];
-            let combined = values
-                .iter()
-                .zip(*noise)
-                .enumerate()
-                .map(|(view, (value, noise))| {
-                    let (value, noise) = (f64::from(*value), f64::from(*noise));
-                    let there = f64::from(there[view]);
-                    let [scale, direction] = cells.squares(light, view, there);
-                    let shares = [
-                        if value > 0.0 { noise / value } else { 0.0 },
-                        direction.sqrt(),
-                        scale.sqrt(),
-                    ];
-                    for (part, of) in row.parts.iter_mut().zip(shares) {
-                        part[view] += (share * of) as f32;
-                    }
-                    (noise * noise + value * value * (scale + direction)).sqrt() as f32
-                });
-            let combined = combined.collect();
-            row.combined.push(combined);
+        for (view, there) in sides.row(light, side).into_iter().enumerate() {
+            let mut parts = [0.0; 3];
+            for ((cells, noise), combined) in channels.iter().zip(noise).zip(&mut row.combined) {
+                let value = f64::from(cells.plane[light * side + view]);
+                let Some(noise) = noise.get(view).copied().map(f64::from) else {
+                    continue;
+                };
+                let [scale, direction] = cells.squares(light, view, there.into());
+                parts[0] += if value > 0.0 { noise / value } else { 0.0 };
+                parts[1] += direction.sqrt();
+                parts[2] += scale.sqrt();
+                let square = noise * noise + value * value * (scale + direction);
+                combined.push(square.sqrt() as f32);
+            }
+            for (row, part) in row.parts.iter_mut().zip(parts) {
+                row[view] = (share * part) as f32;
+            }
         }
         row
     })
+}
+
+fn nodes(grid: Grid) -> Arc<[Node]> {
+    (0..grid.n_directions()).map(|k| node(grid, k)).collect()
 }
 
 fn node(grid: Grid, index: usize) -> Node {

@@ -228,7 +228,7 @@ pub struct Equation {
     level: f64,
     /// Its decimal logarithm.
     level_log: f64,
-    light_mm: f64,
+    per_light_mm: f64,
     /// The standard uncertainties of the effects in radians, mm and shares; of the cones, half the variance of a
     /// component of directions in them.
     inputs: [f64; EFFECTS],
@@ -236,6 +236,8 @@ pub struct Equation {
     patch: [f64; 2],
     /// The share of a frame that shows the sample from straight above, and what the rest adds to the sample's mean.
     frame: [f64; 2],
+    /// What that and the level's own surroundings add up to, over the level.
+    level_frame: f64,
 }
 
 impl Equation {
@@ -256,10 +258,11 @@ impl Equation {
             is_absolute: budget.calibration == ReferenceCalibration::KnownReference,
             level: budget.level,
             level_log: budget.level.decimal_log(),
-            light_mm: budget.light_mm,
+            per_light_mm: 1.0 / budget.light_mm,
             inputs,
             patch: [patch(budget.light_mm), patch(budget.camera_mm)],
             frame: [budget.frame_share, budget.surround],
+            level_frame: 1.0 + budget.surround / budget.level,
         }
     }
 
@@ -312,14 +315,14 @@ impl Equation {
         effects
     }
 
-    /// The level over a value, and its decimal logarithm; `None` of a value that is not positive.
+    /// One over a value, and the decimal logarithm of the level over it; `None` of a value that is not positive.
     #[inline(always)]
     fn bright(&self, shape: &Shape) -> Option<[f64; 2]> {
         // What is known of linearity needs no more digits than single precision has.
         let log = |value: f64| f64::from((value as f32).max(f32::MIN_POSITIVE).natural_log());
         (shape.value > 0.0).then(|| {
             let log = std::f64::consts::LOG10_E * log(shape.value);
-            [self.level / shape.value, self.level_log - log]
+            [1.0 / shape.value, self.level_log - log]
         })
     }
 
@@ -330,16 +333,15 @@ impl Equation {
         light: &Slant,
         view: &Slant,
         shape: &Shape,
-        [bright, bright_log]: [f64; 2],
+        [per_value, bright_log]: [f64; 2],
         to: &mut impl FnMut(Effect, f64),
     ) {
         let Shape {
-            value,
             slopes,
             bends,
             surround,
+            ..
         } = *shape;
-        let per_value = 1.0 / value;
         let mut set = |effect: Effect, sensitivity: f64| {
             to(effect, self.inputs[effect as usize] * sensitivity);
         };
@@ -350,7 +352,7 @@ impl Equation {
             set(Effect::ReferenceTiltX, light.tangent[0]);
             set(Effect::ReferenceTiltY, light.tangent[1]);
             // Of cos θ/d² at a point that is nearer to the light.
-            let nearer = (3.0 * light.cosine - light.per_cosine) / self.light_mm;
+            let nearer = (3.0 * light.cosine - light.per_cosine) * self.per_light_mm;
             set(Effect::ReferenceHeight, nearer);
             set(Effect::Drift, 1.0);
         } else {
@@ -358,11 +360,14 @@ impl Equation {
             light_slope -= light.slope;
         }
         set(Effect::Linearity, -bright_log);
-        set(Effect::Offset, (bright - 1.0) * light.per_cosine);
+        set(
+            Effect::Offset,
+            (self.level * per_value - 1.0) * light.per_cosine,
+        );
         // Of the sample, less what the reference (else the mean of the samples) has, over the part of the frame that
         // shows them.
         let [share, rest] = self.frame;
-        let spread = (surround + rest) * per_value - (1.0 + rest / self.level);
+        let spread = (surround + rest) * per_value - self.level_frame;
         set(Effect::StrayLight, share * view.cosine * spread);
         set(Effect::LightTheta, light_slope);
         set(Effect::LightPhi, slopes[1] * per_value);
