@@ -3,9 +3,10 @@
 use gonia_brdf::Elementary;
 use gonia_brdf::direction::{Vec3, local_direction};
 use gonia_brdf::hemisphere::{paper_lights, paper_views};
+use gonia_brdf::interpolate::coordinates::Point;
 use gonia_brdf::interpolate::cross_validation::Fold;
-use gonia_brdf::interpolate::datum::half_of_data;
-use gonia_brdf::interpolate::hierarchy::Hierarchy;
+use gonia_brdf::interpolate::datum::{Datum, half_of_data};
+use gonia_brdf::interpolate::hierarchy::{Detail, Found, Hierarchy, Neighbours};
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
@@ -546,4 +547,75 @@ fn a_kernel_of_ones_own_is_used_from_the_choice_of_settings_to_the_fill() {
         smoother != usual && smoother < 2.0 * usual,
         "{smoother} {usual}"
     );
+}
+
+/// A pair of directions to predict.
+#[derive(Clone)]
+struct Wanted((Vec3, Vec3));
+
+impl AsRef<(Vec3, Vec3)> for Wanted {
+    fn as_ref(&self) -> &(Vec3, Vec3) {
+        &self.0
+    }
+}
+
+/// Counts how often data around a place are looked for: once a block.
+struct Counting<'a>(&'a Hierarchy, std::cell::Cell<u32>);
+
+impl Neighbours for Counting<'_> {
+    fn around(&self, place: &Point, n: usize, found: &mut Vec<Found>) {
+        self.1.set(self.1.get() + 1);
+        self.0.around(place, n, found);
+    }
+
+    fn expand(&self, place: &Point, merged: &[Found], found: &mut Vec<Found>) {
+        self.0.expand(place, merged, found);
+    }
+
+    fn datum(&self, detail: Detail, number: u32) -> Datum {
+        self.0.datum(detail, number)
+    }
+}
+
+#[test]
+fn predictions_in_one_pair_share_its_blocks_and_are_those_of_each_alone() {
+    let bins = Bins::new(Grid::PAPER, &measure(&*others()[1]));
+    for tolerance in [0.7, f32::INFINITY, 0.0] {
+        let settings = FillSettings {
+            tolerance,
+            noise_variance: (NOISE * NOISE) as f32,
+            ..FillSettings::DEFAULT
+        };
+        let data = Hierarchy::with_mirror_images(half_of_data(&bins, 1, settings.coordinates), 1);
+        let patches = cover(Grid::PAPER, &[8.0, 4.0]).patches;
+        let pair = (&patches[40], &patches[130]);
+        // A place in each part, and again, part by part.
+        let mut wanted = Vec::new();
+        for (a, b) in pair
+            .0
+            .parts
+            .iter()
+            .flat_map(|a| pair.1.parts.iter().map(move |b| (a, b)))
+        {
+            let place = (a.patch.vectors[0], b.patch.vectors[0]);
+            wanted.extend([Wanted(place), Wanted(place)]);
+        }
+        let counting = Counting(&data, 0.into());
+        let mut refiner = Refiner::new(&settings);
+        refiner.prepare(&counting, &settings, pair);
+        let shared = wanted.iter().map(|place| {
+            let of = refiner.predict(&counting, &settings, pair, &mut vec![place.clone()]);
+            (of.logs[0], of.variance, of.variance_of_mean)
+        });
+        let shared: Vec<_> = shared.collect();
+        // The coarse block, the one that it is compared with, and one a part.
+        let parts = pair.0.parts.len() * pair.1.parts.len();
+        assert!(counting.1.get() as usize <= 2 + parts, "{:?}", counting.1);
+        for (place, shared) in wanted.iter().zip(&shared) {
+            let mut refiner = Refiner::new(&settings);
+            refiner.prepare(&data, &settings, pair);
+            let of = refiner.predict(&data, &settings, pair, &mut vec![place.clone()]);
+            assert_eq!((of.logs[0], of.variance, of.variance_of_mean), *shared);
+        }
+    }
 }

@@ -6,8 +6,7 @@ use crate::symmetry::SymmetryArgument;
 use crate::{remarks, say};
 use anyhow::{Context, Result, bail};
 use gonia_brdf::{Direction, Grid};
-use gonia_formats::checksum;
-use gonia_formats::dense::{DenseLookup, ERRORS_OF, read_dense_channels};
+use gonia_formats::dense::{DenseLookup, are_errors_of, read_dense_channels};
 use gonia_formats::directions_csv::{ANGLES, DirectionRow, read_directions};
 use gonia_formats::samples::read_channels;
 use gonia_pipeline::budget::budget_in;
@@ -93,7 +92,7 @@ impl Query {
     fn ask_grid(&self, brdf: &mut DenseLookup) -> Result<()> {
         let rows = asked()?;
         let mut beyond = Beyond::of(brdf.grid());
-        let mut errors = self.errors_of(brdf)?;
+        let mut errors = self.errors()?;
         let mut out = BufWriter::new(std::io::stdout().lock());
         let mut said = header(&mut out, brdf.channels(), errors.is_some());
         for asked in rows {
@@ -114,7 +113,7 @@ impl Query {
     }
 
     /// The error bars of a dense BRDF, where they are asked for.
-    fn errors_of(&self, brdf: &DenseLookup) -> Result<Option<DenseLookup>> {
+    fn errors(&self) -> Result<Option<DenseLookup>> {
         let Some(path) = &self.error else {
             if self.uncertainty {
                 bail!(
@@ -125,20 +124,13 @@ impl Query {
             return Ok(None);
         };
         let errors = DenseLookup::open(path)?;
-        let refuse = |found: &str| {
+        let of = (errors.grid(), errors.channels(), errors.provenance());
+        if !are_errors_of(of, &read_dense_channels(&self.dense)?) {
             bail!(
-                "--error {}: {found} {}; give the error bars that were written with it (gonia fill --error)",
+                "--error {}: is not of the values of {}; give the error bars that were written with it (gonia fill --error)",
                 path.display(),
                 self.dense.display()
-            )
-        };
-        if errors.grid() != brdf.grid() || errors.channels() != brdf.channels() {
-            return refuse("has another grid or other channels than");
-        }
-        // They hold the checksum of the values that they are of.
-        let of = errors.provenance().get(ERRORS_OF);
-        if of != Some(&checksum::of_channels(&read_dense_channels(&self.dense)?)) {
-            return refuse("is not of the values of");
+            );
         }
         Ok(Some(errors))
     }

@@ -6,7 +6,7 @@ use crate::format::{CellReader, Content, DenseFormat, DenseWriter, Format};
 pub use crate::format::{
     ChannelErrors, CombineErrors, ERROR_PARTS, ErrorRow, MakeRows, RowsNote, TakeRow,
 };
-use crate::{FileError, error_exr, table};
+use crate::{FileError, checksum, error_exr, table};
 use gonia_brdf::{Direction, Grid};
 use gonia_rig::{Channels, DenseChannels, DenseFile, Scale};
 use std::collections::BTreeMap;
@@ -90,6 +90,17 @@ pub fn write_error_bars(
     provenance: &BTreeMap<String, String>,
 ) -> Result<(), FileError> {
     (writer_of_name(path)?.error_bars)(path, grid, bars, combine, scale, provenance)
+}
+
+/// Whether standard errors, of which a file says this, were written with some values: they are of their grid and channels, and
+/// hold their checksum.
+pub fn are_errors_of(
+    (grid, channels, provenance): (Grid, &Channels, &BTreeMap<String, String>),
+    values: &DenseChannels,
+) -> bool {
+    grid == values.grid
+        && *channels == values.channels
+        && provenance.get(ERRORS_OF) == Some(&checksum::of_channels(values))
 }
 
 /// The cells' origins of a file of standard errors ([`write_error_bars`]), in the grid's order; `None` where it holds

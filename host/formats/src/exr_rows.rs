@@ -59,7 +59,12 @@ impl RowWriter<'_> {
             }
             next = place + 1;
             if let Some((_, bytes)) = pieces.last_mut() {
-                bytes.extend(values[k].iter().flat_map(|v| v.to_le_bytes()));
+                let from = bytes.len();
+                bytes.resize(from + 4 * values[k].len(), 0);
+                let places = bytes[from..].chunks_exact_mut(4);
+                for (place, value) in places.zip(values[k]) {
+                    place.copy_from_slice(&value.to_le_bytes());
+                }
             }
         }
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);

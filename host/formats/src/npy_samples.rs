@@ -176,11 +176,7 @@ impl SampleArray {
                 "save float32 where angles are known better",
             )
         });
-        self.columns
-            .remark(path)
-            .into_iter()
-            .chain(of_types)
-            .collect()
+        self.columns.remarks(path).chain(of_types).collect()
     }
 
     /// Reads the samples from the elements. `is_there` says that all of their bytes are in the file.

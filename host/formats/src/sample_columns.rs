@@ -39,6 +39,8 @@ pub(super) struct SampleColumns {
     frame: Option<usize>,
     /// Columns in radians by their names.
     in_radians: Vec<String>,
+    /// Columns of uncertainties by their names, which are not read.
+    uncertainties: Vec<String>,
 }
 
 /// Why the names of a table's columns do not say which is which.
@@ -46,6 +48,9 @@ pub(super) struct Unclear {
     pub problem: String,
     pub remedy: &'static str,
 }
+
+/// What the name of a column of uncertainties begins with.
+const UNCERTAINTY: &str = "u_";
 
 impl SampleColumns {
     /// By the names of the columns; others are ignored.
@@ -85,6 +90,11 @@ impl SampleColumns {
             in_radians: in_radians
                 .map(|angle| text(angle.place).to_owned())
                 .collect(),
+            uncertainties: (0..names.len())
+                .map(text)
+                .filter(|name| name.starts_with(UNCERTAINTY))
+                .map(str::to_owned)
+                .collect(),
             frame: place(Quantity::Frame)?.map(|(place, _)| place),
             angles,
             channels,
@@ -109,6 +119,7 @@ impl SampleColumns {
             values: (4..4 + channels.count()).collect(),
             channels,
             frame,
+            uncertainties: Vec::new(),
             in_radians: Vec::new(),
         })
     }
@@ -130,17 +141,23 @@ impl SampleColumns {
     }
 
     /// What is to be said of the columns as a whole.
-    pub fn remark(&self, path: &Path) -> Option<Remark> {
-        (!self.in_radians.is_empty()).then(|| {
+    pub fn remarks(&self, path: &Path) -> impl Iterator<Item = Remark> {
+        let listed = |names: &[String]| (!names.is_empty()).then(|| names.join(", "));
+        let radians = listed(&self.in_radians).map(|names| {
             Remark::new(
                 path.display(),
-                format_args!(
-                    "by their names {} hold radians, and were converted to degrees",
-                    self.in_radians.join(", ")
-                ),
+                format_args!("by their names {names} hold radians, and were converted to degrees"),
                 "rename them if they hold degrees",
             )
-        })
+        });
+        let uncertainties = listed(&self.uncertainties).map(|names| {
+            Remark::new(
+                path.display(),
+                format_args!("{names} are uncertainties, which are not read"),
+                "gonia fill --error finds them again from what is said above the header, and adds noise and directions",
+            )
+        });
+        radians.into_iter().chain(uncertainties)
     }
 
     /// Room for samples of these columns.

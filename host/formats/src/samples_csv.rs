@@ -90,7 +90,7 @@ pub(super) fn read(path: &Path) -> Result<ChannelsRead, FileError> {
             "name the columns in the first line, separated by semicolons where decimals follow commas",
         ));
     }
-    let remarks = columns.remark(path).into_iter().chain(assumed).collect();
+    let remarks = columns.remarks(path).chain(assumed).collect();
     Ok(ChannelsRead {
         remarks,
         ..samples.into()
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn uncertainties_are_columns_that_other_readers_of_samples_pass_over() {
+    fn uncertainties_are_columns_that_readers_of_samples_pass_over_and_say_so() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("samples.csv");
         let at = |deg: f64| gonia_brdf::Direction::from_deg(deg, 2.0 * deg);
@@ -423,7 +423,11 @@ mod tests {
             lines.next().unwrap(),
             "10,20,20,40,0.1,0.2,0.3,0.01,0.02,0.03,4"
         );
-        assert_eq!(read_samples(&path).unwrap().samples, samples);
+        let read = read_samples(&path).unwrap();
+        assert_eq!(read.samples, samples);
+        let said: Vec<String> = read.remarks.iter().map(ToString::to_string).collect();
+        let expected = "u_scale_r, u_scale_g, u_scale_b are uncertainties, which are not read";
+        assert!(said.len() == 1 && said[0].contains(expected), "{said:?}");
     }
 
     #[test]

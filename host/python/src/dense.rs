@@ -7,8 +7,8 @@ use gonia_brdf::Direction;
 use gonia_formats::checksum;
 use gonia_formats::dense::ChannelErrors;
 use gonia_formats::dense::{
-    CombineErrors, ERRORS_OF, read_dense_channels, read_origins, write_dense_channels,
-    write_error_bars,
+    CombineErrors, ERRORS_OF, are_errors_of, read_dense_channels, read_origins,
+    write_dense_channels, write_error_bars,
 };
 use gonia_pipeline::budget::{UNCERTAINTIES, budget_in, combine_errors};
 use gonia_rig::DenseChannels;
@@ -68,7 +68,7 @@ impl Dense {
                 let bars = read_dense_channels(&error)?;
                 Ok::<_, gonia_formats::FileError>((bars, read_origins(&error)?))
             })?;
-            if planes.provenance.get(ERRORS_OF) != Some(&checksum::of_channels(&file)) {
+            if !are_errors_of((planes.grid, &planes.channels, &planes.provenance), &file) {
                 return Err(to_py(format!(
                     "{}: is not of the values of {}; give the error bars that were written with it (gonia fill --error)",
                     error.display(),

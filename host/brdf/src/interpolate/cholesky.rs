@@ -51,6 +51,46 @@ impl Columns {
         }
         true
     }
+
+    /// `L⁻¹ b` of a factor's first `n` rows for `P` vectors of right-hand sides, which stand row by row in `b` and are
+    /// replaced. `R` rows at a time take what the rows above give them while their sums stay in registers: `n` is to be a
+    /// multiple of it.
+    #[inline(always)]
+    pub fn solve<S: Simd, const R: usize, const P: usize>(
+        &self,
+        simd: S,
+        n: usize,
+        b: &mut [[S::f32s; P]],
+    ) {
+        let zero = simd.splat_f32s(0.0);
+        for i in (0..n).step_by(R) {
+            let (above, rest) = b.split_at_mut(i);
+            let panel = &mut rest[..R];
+            let mut sums = [[zero; P]; R];
+            for (column, x) in self.data.chunks_exact(self.rows).zip(above.iter()) {
+                let l = &column[i..i + R];
+                for r in 0..R {
+                    let l = simd.splat_f32s(l[r]);
+                    for p in 0..P {
+                        sums[r][p] = simd.mul_add_e_f32s(l, x[p], sums[r][p]);
+                    }
+                }
+            }
+            for r in 0..R {
+                for c in 0..r {
+                    let l = simd.splat_f32s(self.column(i + c)[i + r]);
+                    for p in 0..P {
+                        sums[r][p] = simd.mul_add_e_f32s(l, panel[c][p], sums[r][p]);
+                    }
+                }
+                let inverse = simd.splat_f32s(1.0 / self.column(i + r)[i + r]);
+                for p in 0..P {
+                    let left = simd.sub_f32s(panel[r][p], sums[r][p]);
+                    panel[r][p] = simd.mul_f32s(left, inverse);
+                }
+            }
+        }
+    }
 }
 
 /// `panel −= L[.., ..j] · L[j..j+4, ..j]ᵀ` in rows `first..`.
@@ -180,6 +220,52 @@ mod tests {
                     .map(|k| f64::from(l.column(k)[i]) * f64::from(l.column(k)[n + 3]))
                     .sum();
                 assert!((b - f64::from(original.column(i)[n + 3])).abs() < 1e-3);
+            }
+        }
+    }
+
+    struct Solve<'a>(&'a Columns, usize, &'a mut [f32]);
+    impl WithSimd for Solve<'_> {
+        type Output = usize;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> usize {
+            let (vectors, _) = S::as_mut_simd_f32s(self.2);
+            let (pairs, _) = vectors.as_chunks_mut::<2>();
+            self.0.solve::<S, 4, 2>(simd, self.1, pairs);
+            2 * S::F32_LANES
+        }
+    }
+
+    #[test]
+    fn many_right_hand_sides_are_solved_as_the_extra_rows_are() {
+        for n in [16, 96] {
+            let mut l = matrix(n, 0.1);
+            assert!(Arch::new().dispatch(Factor(&mut l, n)));
+            for simd in [true, false] {
+                let mut b = vec![0.0; 32 * n];
+                let lanes = match simd {
+                    true => Arch::new().dispatch(Solve(&l, 0, &mut [])),
+                    false => Solve(&l, 0, &mut []).with_simd(pulp::Scalar),
+                };
+                for j in 0..n {
+                    for lane in 0..lanes {
+                        b[j * lanes + lane] = ((j + lane % 16) % 7) as f32;
+                    }
+                }
+                let b = &mut b[..n * lanes];
+                match simd {
+                    true => Arch::new().dispatch(Solve(&l, n, b)),
+                    false => Solve(&l, n, b).with_simd(pulp::Scalar),
+                };
+                for j in 0..n {
+                    for lane in 0..lanes {
+                        let (x, y) = (b[j * lanes + lane], l.column(j)[n + lane % 16]);
+                        assert!(
+                            (x - y).abs() < 1e-4 * y.abs().max(1.0),
+                            "{j} {lane}: {x} {y}"
+                        );
+                    }
+                }
             }
         }
     }

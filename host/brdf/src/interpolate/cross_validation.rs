@@ -8,7 +8,7 @@ use super::FillSettings;
 use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::{Data, MANY_BINS};
 use super::patches::{Patch, cover};
-use super::refine::Refiner;
+use super::refine::{Predicted, Refiner, part_of};
 use crate::bins::{Bin, Bins};
 use crate::direction::{Direction, Vec3};
 use crate::elementary::Elementary;
@@ -199,57 +199,90 @@ impl<'a, const N: usize> Fold<'a, N> {
         'a: 'b,
         dyn AnyKernel: NewBlock<N>,
     {
-        let bins = self.bins;
-        let grid = bins.grid();
-        let residual = |bin: &Bin<N>, log: [f32; N]| {
-            std::array::from_fn(|c| {
-                let measured = bins.log_value(bin, c, f32::MIN_POSITIVE);
-                (bin.median[c] > 0.0).then(|| log[c] - measured)
-            })
-        };
         let sorted = data.sorted_for(settings.coordinates);
         let training = sorted
             .as_ref()
             .unwrap_or(data)
             .subset(settings.coordinates, |bin| self.training[bin]);
-        let patches = cover(grid, &settings.patch_sizes_deg()).patches;
-        let patch_of = patch_of_direction(grid, &patches);
+        let patches = cover(self.bins.grid(), &settings.patch_sizes_deg()).patches;
+        let pair = |(p, q): (usize, usize)| (&patches[p], &patches[q]);
         let work = || (Refiner::new(settings), Vec::new());
-        self.tests
-            .par_iter()
-            .map_init(work, |(refiner, members), (bin, weight)| {
-                let (light, view) = grid.light_and_view(bin.cell as usize);
-                let (p, q) = (&patches[patch_of[light]], &patches[patch_of[view]]);
-                let mates = mates(bin);
-                let step = mates.len().div_ceil(MATES).max(1);
-                let others = mates.iter().step_by(step);
-                let others = others.filter(|mate| mate.cell != bin.cell).copied();
-                members.clear();
-                members.extend(std::iter::once(*bin).chain(others).map(Member::of));
-                let predicted = refiner.predict(&training, settings, (p, q), members);
-                let mut mean = MeanPrediction {
-                    first: Prediction {
-                        bin,
-                        weight: *weight,
-                        log: predicted.logs[0],
-                        residual: residual(bin, predicted.logs[0]),
-                        variance: predicted.variance,
-                    },
-                    group: group_of(bin, self.framed),
-                    bins: members.iter().map(|m| m.bin).collect(),
-                    residual: [Some(0.0); N],
-                    variance: predicted.variance_of_mean,
+        let mut means: Vec<(usize, MeanPrediction<'a, N>)> = self
+            .tests_by_block(&patches)
+            .par_chunk_by(|a, b| a.0 == b.0)
+            .map_init(work, |(refiner, members), tests| {
+                let pair = pair(tests[0].0);
+                refiner.prepare(&training, settings, pair);
+                let of_test = |test: usize| {
+                    let (bin, weight) = self.tests[test];
+                    let mates = mates(bin);
+                    let step = mates.len().div_ceil(MATES).max(1);
+                    let others = mates.iter().step_by(step);
+                    let others = others.filter(|mate| mate.cell != bin.cell).copied();
+                    members.clear();
+                    members.extend(std::iter::once(bin).chain(others).map(Member::of));
+                    let predicted = refiner.predict(&training, settings, pair, members);
+                    (test, self.mean_of(weight, members, &predicted))
                 };
-                let share = 1.0 / members.len() as f32;
-                for (member, log) in members.iter().zip(predicted.logs) {
-                    let own = residual(member.bin, *log);
-                    for c in 0..N {
-                        mean.residual[c] = mean.residual[c].zip(own[c]).map(|(m, r)| m + share * r);
-                    }
-                }
-                mean
+                tests.iter().map(|of| of.2).map(of_test).collect::<Vec<_>>()
             })
-            .collect()
+            .flatten_iter()
+            .collect();
+        means.sort_unstable_by_key(|(test, _)| *test);
+        means.into_iter().map(|(_, mean)| mean).collect()
+    }
+
+    /// The numbers of the tests, each with the pair of patches that it is in and the part of this pair: in this order,
+    /// tests of one pair share its coarse block, and those of one part a fine one.
+    fn tests_by_block(&self, patches: &[Patch]) -> Vec<((usize, usize), Option<usize>, usize)> {
+        let grid = self.bins.grid();
+        let patch_of = patch_of_direction(grid, patches);
+        let of_test = |(test, (bin, _)): (usize, &(&Bin<N>, f32))| {
+            let (light, view) = grid.light_and_view(bin.cell as usize);
+            let (p, q) = (patch_of[light], patch_of[view]);
+            let place = Member::of(*bin).place;
+            ((p, q), part_of((&patches[p], &patches[q]), place), test)
+        };
+        let mut tests: Vec<_> = self.tests.iter().enumerate().map(of_test).collect();
+        tests.sort_unstable();
+        tests
+    }
+
+    /// What was predicted of some bins, of which the first is the test.
+    fn mean_of(
+        &self,
+        weight: f32,
+        members: &[Member<'a, N>],
+        predicted: &Predicted<'_, N>,
+    ) -> MeanPrediction<'a, N> {
+        let residual = |bin: &Bin<N>, log: [f32; N]| {
+            std::array::from_fn(|c| {
+                let measured = self.bins.log_value(bin, c, f32::MIN_POSITIVE);
+                (bin.median[c] > 0.0).then(|| log[c] - measured)
+            })
+        };
+        let (bin, log) = (members[0].bin, predicted.logs[0]);
+        let mut mean = MeanPrediction {
+            first: Prediction {
+                bin,
+                weight,
+                log,
+                residual: residual(bin, log),
+                variance: predicted.variance,
+            },
+            group: group_of(bin, self.framed),
+            bins: members.iter().map(|m| m.bin).collect(),
+            residual: [Some(0.0); N],
+            variance: predicted.variance_of_mean,
+        };
+        let share = 1.0 / members.len() as f32;
+        for (member, log) in members.iter().zip(predicted.logs) {
+            let own = residual(member.bin, *log);
+            for c in 0..N {
+                mean.residual[c] = mean.residual[c].zip(own[c]).map(|(m, r)| m + share * r);
+            }
+        }
+        mean
     }
 }
 

@@ -45,6 +45,8 @@ impl ErrorFall {
         dyn AnyKernel: NewBlock<N>,
     {
         let bins = data.bins();
+        let sorted = data.sorted_for(settings.coordinates);
+        let data = sorted.as_ref().unwrap_or(data);
         let folds = Fold::number_of_many_groups(bins, ONE_IN);
         let (mut whole, mut half) = (Vec::new(), Vec::new());
         for number in 0..folds {

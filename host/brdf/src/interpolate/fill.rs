@@ -52,7 +52,7 @@ where
     ))
 }
 
-/// The same with a standard error for each cell. It takes about twice the time.
+/// The same with a standard error for each cell. It takes about half as long again.
 ///
 /// # Errors
 /// Too few bins.

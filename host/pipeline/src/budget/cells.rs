@@ -1,6 +1,6 @@
 //! The measurement equation at every cell of a dense BRDF, and at any pair of directions of what can be asked.
 
-use crate::budget::equation::{Effects, Equation, Part, Shape, Slant};
+use crate::budget::equation::{Effects, Equation, Shape, Slant};
 use crate::budget::sides::Sides;
 use gonia_brdf::{Direction, Elementary, Grid};
 use gonia_formats::dense::ErrorRow;
@@ -35,7 +35,7 @@ pub struct CellUncertainty<'a> {
     grid: Grid,
     plane: &'a [f32],
     equation: Equation,
-    nodes: Vec<Node>,
+    nodes: Arc<[Node]>,
     sides: Arc<Sides>,
 }
 
@@ -44,12 +44,19 @@ impl<'a> CellUncertainty<'a> {
     /// ([`Origin`](gonia_brdf::interpolate::Origin), in the grid's order; an empty list where they are not known) say on which side
     /// of each cell its samples lie.
     pub fn new(grid: Grid, plane: &'a [f32], origins: &[u8], budget: &Budget) -> Option<Self> {
-        Self::with_sides(grid, plane, Arc::new(Sides::of(grid, origins)), budget)
+        Self::with_nodes(
+            grid,
+            plane,
+            nodes(grid),
+            Arc::new(Sides::of(grid, origins)),
+            budget,
+        )
     }
 
-    fn with_sides(
+    fn with_nodes(
         grid: Grid,
         plane: &'a [f32],
+        nodes: Arc<[Node]>,
         sides: Arc<Sides>,
         budget: &Budget,
     ) -> Option<Self> {
@@ -57,18 +64,29 @@ impl<'a> CellUncertainty<'a> {
             grid,
             plane,
             equation: Equation::new(budget),
-            nodes: (0..grid.n_directions()).map(|k| node(grid, k)).collect(),
+            nodes,
             sides,
         })
     }
 
     /// The effects at a cell, by the indices of its light and view. The table is reciprocal, as every fill is.
     pub fn effects(&self, light: usize, view: usize) -> Effects {
-        self.effects_from(light, view, self.sides.there(light, view))
+        let shape = self.shape(light, view);
+        let slants = (&self.nodes[light].slant, &self.nodes[view].slant);
+        let there = self.sides.there(light, view);
+        self.equation.of_reciprocal(slants, &shape, there)
     }
 
-    /// The same of a cell whose value comes by a share from samples at its own light and view.
-    fn effects_from(&self, light: usize, view: usize, there: f64) -> Effects {
+    /// The squares of the relative standard uncertainties of scale and direction at a cell whose value comes by a share from
+    /// samples at its own light and view.
+    fn squares(&self, light: usize, view: usize, there: f64) -> [f64; 2] {
+        let shape = self.shape(light, view);
+        let slants = (&self.nodes[light].slant, &self.nodes[view].slant);
+        self.equation.squares(slants, &shape, there)
+    }
+
+    #[inline(always)]
+    fn shape(&self, light: usize, view: usize) -> Shape {
         let (at_light, at_view) = (&self.nodes[light], &self.nodes[view]);
         let n = self.grid.n_directions();
         let at = |light: u32, view: u32| f64::from(self.plane[light as usize * n + view as usize]);
@@ -87,14 +105,12 @@ impl<'a> CellUncertainty<'a> {
         bends[0] += slopes[0] * at_light.ring;
         bends[1] += slopes[2] * at_view.ring;
         let around: f64 = at_view.around.iter().map(|v| at(i, *v)).sum();
-        let shape = Shape {
+        Shape {
             value,
             slopes,
             bends,
             surround: around / AROUND as f64,
-        };
-        let slants = (&at_light.slant, &at_view.slant);
-        self.equation.of_reciprocal(slants, &shape, there)
+        }
     }
 }
 
@@ -107,43 +123,42 @@ pub fn combine_errors<'a>(
     budget: &Budget,
 ) -> Option<impl Fn(usize, &[&[f32]]) -> ErrorRow + Sync + use<'a>> {
     let side = grid.n_directions();
-    let sides = Arc::new(Sides::of(grid, origins));
-    let of_channel =
-        |plane: &'a Vec<f32>| CellUncertainty::with_sides(grid, plane, sides.clone(), budget);
+    let (nodes, sides) = (nodes(grid), Arc::new(Sides::of(grid, origins)));
+    let of_channel = |plane: &'a Vec<f32>| {
+        CellUncertainty::with_nodes(grid, plane, nodes.clone(), sides.clone(), budget)
+    };
     let channels: Vec<CellUncertainty<'a>> =
         planes.iter().map(of_channel).collect::<Option<_>>()?;
     let share = 1.0 / channels.len().max(1) as f64;
     Some(move |light: usize, noise: &[&[f32]]| {
         let mut row = ErrorRow {
-            combined: Vec::with_capacity(channels.len()),
+            combined: vec![Vec::with_capacity(side); channels.len()],
             parts: [(); 3].map(|()| vec![0.0; side]),
         };
-        let there = sides.row(light, side);
-        for (cells, noise) in channels.iter().zip(noise) {
-            let values = &cells.plane[light * side..(light + 1) * side];
-            let combined = values
-                .iter()
-                .zip(*noise)
-                .enumerate()
-                .map(|(view, (value, noise))| {
-                    let (value, noise) = (f64::from(*value), f64::from(*noise));
-                    let effects = cells.effects_from(light, view, f64::from(there[view]));
-                    let shares = [
-                        if value > 0.0 { noise / value } else { 0.0 },
-                        effects.u(Part::Direction),
-                        effects.u(Part::Scale),
-                    ];
-                    for (part, of) in row.parts.iter_mut().zip(shares) {
-                        part[view] += (share * of) as f32;
-                    }
-                    let known = shares[1] * shares[1] + shares[2] * shares[2];
-                    (noise * noise + value * value * known).sqrt() as f32
-                });
-            let combined = combined.collect();
-            row.combined.push(combined);
+        for (view, there) in sides.row(light, side).into_iter().enumerate() {
+            let mut parts = [0.0; 3];
+            for ((cells, noise), combined) in channels.iter().zip(noise).zip(&mut row.combined) {
+                let value = f64::from(cells.plane[light * side + view]);
+                let Some(noise) = noise.get(view).copied().map(f64::from) else {
+                    continue;
+                };
+                let [scale, direction] = cells.squares(light, view, there.into());
+                parts[0] += if value > 0.0 { noise / value } else { 0.0 };
+                parts[1] += direction.sqrt();
+                parts[2] += scale.sqrt();
+                let square = noise * noise + value * value * (scale + direction);
+                combined.push(square.sqrt() as f32);
+            }
+            for (row, part) in row.parts.iter_mut().zip(parts) {
+                row[view] = (share * part) as f32;
+            }
         }
         row
     })
+}
+
+fn nodes(grid: Grid) -> Arc<[Node]> {
+    (0..grid.n_directions()).map(|k| node(grid, k)).collect()
 }
 
 fn node(grid: Grid, index: usize) -> Node {
@@ -288,6 +303,7 @@ fn moved(direction: Direction, [along, across]: [f64; 2]) -> Direction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::equation::Part;
     use gonia_brdf::DenseBrdf;
     use gonia_brdf::model::{Brdf, Ggx};
     use gonia_rig::{Input, ReferenceCalibration, Rig};
@@ -356,6 +372,14 @@ mod tests {
                 let effects = cells.effects(light, view);
                 for u in [Part::Direction, Part::Scale].map(|part| effects.u(part)) {
                     assert!(u.is_finite() && u > 0.0 && u < 1.0, "{light} {view} {u}");
+                }
+                let there = cells.sides.there(light, view);
+                let squares = [Part::Scale, Part::Direction].map(|part| effects.u(part).powi(2));
+                for (short, long) in cells.squares(light, view, there).iter().zip(squares) {
+                    assert!(
+                        (short - long).abs() < 1e-9 * long,
+                        "{light} {view} {short} {long}"
+                    );
                 }
             }
         }

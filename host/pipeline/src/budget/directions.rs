@@ -1,8 +1,7 @@
 //! How well a calibrated rig knows its directions.
 
-use crate::calibrate::numbers::directions;
+use crate::calibrate::numbers::direction_variances;
 use gonia_brdf::Pose;
-use gonia_brdf::direction::Vec3;
 use gonia_rig::Rig;
 
 /// Step of numeric derivatives, in standard uncertainties.
@@ -28,33 +27,13 @@ pub fn direction_u(rig: &Rig, poses: &[Pose]) -> [Option<f64>; 2] {
             (*u > 0.0).then_some((STEP * u, rig))
         })
         .collect();
-    let variance = |pose: &Pose| {
-        let at = directions(rig, *pose);
-        let beside: Vec<Option<(f64, [Vec3; 2])>> = moved
-            .iter()
-            .map(|of| {
-                of.as_ref()
-                    .map(|(step, rig)| (*step, directions(rig, *pose)))
-            })
-            .collect();
-        [0, 1].map(|i| {
-            let slope = |k: usize, axis: usize| {
-                beside[k].map_or(0.0, |(step, to)| (to[i][axis] - at[i][axis]) / step)
-            };
-            let mut sum = 0.0;
-            for axis in 0..3 {
-                for (j, row) in calibration.covariance.iter().enumerate() {
-                    for (k, covariance) in row.iter().enumerate() {
-                        sum += slope(j, axis) * covariance * slope(k, axis);
-                    }
-                }
-            }
-            sum
-        })
+    let covariance = |j: usize, k: usize| {
+        let row = calibration.covariance.get(j);
+        row.and_then(|row| row.get(k)).copied().unwrap_or(0.0)
     };
     let mut mean = [0.0; 2];
     for pose in poses {
-        let of = variance(pose);
+        let of = direction_variances(rig, &moved, covariance, *pose);
         for i in 0..2 {
             mean[i] += of[i] / poses.len() as f64;
         }

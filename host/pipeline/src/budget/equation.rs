@@ -226,7 +226,9 @@ impl Slant {
 pub struct Equation {
     is_absolute: bool,
     level: f64,
-    light_mm: f64,
+    /// Its decimal logarithm.
+    level_log: f64,
+    per_light_mm: f64,
     /// The standard uncertainties of the effects in radians, mm and shares; of the cones, half the variance of a
     /// component of directions in them.
     inputs: [f64; EFFECTS],
@@ -234,6 +236,8 @@ pub struct Equation {
     patch: [f64; 2],
     /// The share of a frame that shows the sample from straight above, and what the rest adds to the sample's mean.
     frame: [f64; 2],
+    /// What that and the level's own surroundings add up to, over the level.
+    level_frame: f64,
 }
 
 impl Equation {
@@ -253,10 +257,12 @@ impl Equation {
         Self {
             is_absolute: budget.calibration == ReferenceCalibration::KnownReference,
             level: budget.level,
-            light_mm: budget.light_mm,
+            level_log: budget.level.decimal_log(),
+            per_light_mm: 1.0 / budget.light_mm,
             inputs,
             patch: [patch(budget.light_mm), patch(budget.camera_mm)],
             frame: [budget.frame_share, budget.surround],
+            level_frame: 1.0 + budget.surround / budget.level,
         }
     }
 
@@ -279,20 +285,65 @@ impl Equation {
         Effects([self.shares(light, view, shape), [0.0; EFFECTS]])
     }
 
+    /// The squares of the relative standard uncertainties of scale and direction ([`Effects::u`]) of what
+    /// [`Self::of_reciprocal`] gives, without a list of the effects: a table has hundreds of millions of values.
+    pub fn squares(&self, (light, view): (&Slant, &Slant), shape: &Shape, there: f64) -> [f64; 2] {
+        let Some(bright) = self.bright(shape) else {
+            return [0.0; 2];
+        };
+        let mut squares = [0.0; 2];
+        let mut add = |effect: Effect, share: f64, weight: f64| {
+            squares[usize::from(effect.part() == Part::Direction)] += weight * share * share;
+        };
+        self.each(light, view, shape, bright, &mut |effect, share| {
+            add(effect, share, there);
+        });
+        let exchanged = shape.exchanged();
+        self.each(view, light, &exchanged, bright, &mut |effect, share| {
+            add(effect, share, 1.0 - there);
+        });
+        squares
+    }
+
     fn shares(&self, light: &Slant, view: &Slant, shape: &Shape) -> [f64; EFFECTS] {
+        let mut effects = [0.0; EFFECTS];
+        if let Some(bright) = self.bright(shape) {
+            self.each(light, view, shape, bright, &mut |effect, share| {
+                effects[effect as usize] = share;
+            });
+        }
+        effects
+    }
+
+    /// One over a value, and the decimal logarithm of the level over it; `None` of a value that is not positive.
+    #[inline(always)]
+    fn bright(&self, shape: &Shape) -> Option<[f64; 2]> {
+        // What is known of linearity needs no more digits than single precision has.
+        let log = |value: f64| f64::from((value as f32).max(f32::MIN_POSITIVE).natural_log());
+        (shape.value > 0.0).then(|| {
+            let log = std::f64::consts::LOG10_E * log(shape.value);
+            [1.0 / shape.value, self.level_log - log]
+        })
+    }
+
+    /// Gives each effect its share, of a positive value.
+    #[inline(always)]
+    fn each(
+        &self,
+        light: &Slant,
+        view: &Slant,
+        shape: &Shape,
+        [per_value, bright_log]: [f64; 2],
+        to: &mut impl FnMut(Effect, f64),
+    ) {
         let Shape {
-            value,
             slopes,
             bends,
             surround,
+            ..
         } = *shape;
-        if value.is_nan() || value <= 0.0 {
-            return [0.0; EFFECTS];
-        }
-        let per_value = 1.0 / value;
-        let mut effects = [0.0; EFFECTS];
         let mut set = |effect: Effect, sensitivity: f64| {
-            effects[effect as usize] = self.inputs[effect as usize] * sensitivity;
+            to(effect, self.inputs[effect as usize] * sensitivity);
         };
         let mut light_slope = slopes[0] * per_value;
         if self.is_absolute {
@@ -301,20 +352,22 @@ impl Equation {
             set(Effect::ReferenceTiltX, light.tangent[0]);
             set(Effect::ReferenceTiltY, light.tangent[1]);
             // Of cos θ/d² at a point that is nearer to the light.
-            let nearer = (3.0 * light.cosine - light.per_cosine) / self.light_mm;
+            let nearer = (3.0 * light.cosine - light.per_cosine) * self.per_light_mm;
             set(Effect::ReferenceHeight, nearer);
             set(Effect::Drift, 1.0);
         } else {
             // No reference at the same pose takes the light's cosine out.
             light_slope -= light.slope;
         }
-        let bright = self.level * per_value;
-        set(Effect::Linearity, -bright.decimal_log());
-        set(Effect::Offset, (bright - 1.0) * light.per_cosine);
+        set(Effect::Linearity, -bright_log);
+        set(
+            Effect::Offset,
+            (self.level * per_value - 1.0) * light.per_cosine,
+        );
         // Of the sample, less what the reference (else the mean of the samples) has, over the part of the frame that
         // shows them.
         let [share, rest] = self.frame;
-        let spread = (surround + rest) * per_value - (1.0 + rest / self.level);
+        let spread = (surround + rest) * per_value - self.level_frame;
         set(Effect::StrayLight, share * view.cosine * spread);
         set(Effect::LightTheta, light_slope);
         set(Effect::LightPhi, slopes[1] * per_value);
@@ -325,7 +378,6 @@ impl Equation {
         set(Effect::Lens, bends[1]);
         let over_patch = self.patch[0] * bends[0] + self.patch[1] * bends[1];
         set(Effect::Patch, over_patch);
-        effects
     }
 }
 

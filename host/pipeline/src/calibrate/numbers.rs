@@ -1,7 +1,7 @@
 //! What became of each number, and what all of them together mean for directions.
 
 use crate::calibrate::unknowns::{Moves, Unknown, with_values};
-use gonia_brdf::direction::{Vec3, angle_between};
+use gonia_brdf::direction::{Vec3, angle_between, dot};
 use gonia_brdf::{Elementary, Pose};
 use gonia_rig::{CameraModel, CameraShift, Rig};
 use nalgebra::{DMatrix, DVector};
@@ -205,6 +205,37 @@ pub fn changes(from: &Rig, to: &Rig, poses: &[Pose]) -> [Spread; 2] {
     })
 }
 
+/// The squares of the standard uncertainties of the directions of light and view at a pose, both components together, square
+/// radians, that follow from a covariance of numbers. `beside` are rigs in which one of the numbers is larger by a step, each
+/// with its step; none where that number is known for certain.
+pub fn direction_variances(
+    here: &Rig,
+    beside: &[Option<(f64, Rig)>],
+    covariance: impl Fn(usize, usize) -> f64,
+    pose: Pose,
+) -> [f64; 2] {
+    let at = directions(here, pose);
+    let slopes: Vec<[Vec3; 2]> = beside
+        .iter()
+        .map(|moved| match moved {
+            Some((step, rig)) => {
+                let to = directions(rig, pose);
+                [0, 1].map(|i| [0, 1, 2].map(|axis| (to[i][axis] - at[i][axis]) / step))
+            }
+            None => [[0.0; 3]; 2],
+        })
+        .collect();
+    [0, 1].map(|i| {
+        let mut sum = 0.0;
+        for (j, of_j) in slopes.iter().enumerate() {
+            for (k, of_k) in slopes.iter().enumerate() {
+                sum += covariance(j, k) * dot(of_j[i], of_k[i]);
+            }
+        }
+        sum.max(0.0)
+    })
+}
+
 /// Standard uncertainties of directions of light and view (both components together) that follow from those
 /// of the numbers.
 pub fn direction_u(
@@ -224,41 +255,18 @@ pub fn direction_u(
         }
         rig
     };
+    let beside: Vec<Option<(f64, Rig)>> = (0..values.len())
+        .map(|k| {
+            let step = STEP * covariance[(k, k)].sqrt();
+            let mut moved = values.to_vec();
+            moved[k] += step;
+            (step > 0.0).then(|| (step, rig_with(&moved)))
+        })
+        .collect();
     let here = rig_with(values);
-    let steps: Vec<f64> = covariance
-        .diagonal()
-        .iter()
-        .map(|v| STEP * v.sqrt())
-        .collect();
-    let beside: Vec<Option<Rig>> = steps
-        .iter()
-        .enumerate()
-        .map(|(k, step)| {
-            (*step > 0.0).then(|| {
-                let mut moved = values.to_vec();
-                moved[k] += step;
-                rig_with(&moved)
-            })
-        })
-        .collect();
     let u = |pose: &Pose| {
-        let at = directions(&here, *pose);
-        let moved: Vec<Option<[Vec3; 2]>> = beside
-            .iter()
-            .map(|rig| rig.as_ref().map(|rig| directions(rig, *pose)))
-            .collect();
-        [0, 1].map(|i| {
-            let variance: f64 = (0..3)
-                .map(|axis| {
-                    let gradient = DVector::from_fn(values.len(), |k, _| match &moved[k] {
-                        Some(to) => (to[i][axis] - at[i][axis]) / steps[k],
-                        None => 0.0,
-                    });
-                    (gradient.transpose() * covariance * &gradient)[0]
-                })
-                .sum();
-            variance.max(0.0).sqrt().to_degrees()
-        })
+        let variances = direction_variances(&here, &beside, |j, k| covariance[(j, k)], *pose);
+        variances.map(|variance| variance.sqrt().to_degrees())
     };
     let all: Vec<[f64; 2]> = poses.iter().map(u).collect();
     [0, 1].map(|i| Spread::of(all.iter().map(|u| u[i]).collect()))

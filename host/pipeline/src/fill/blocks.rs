@@ -59,6 +59,7 @@ where
         Start::Chosen(settings) => settings,
     };
     let (dense, errors, fall) = if with_errors {
+        let known = known.in_order_for(settings.coordinates);
         let (calibration, fall) = step(progress, Step::CalibratingErrorBars, |_| {
             let calibration = Calibration::new(&known, &settings).ok_or(Error::TooFewFrames)?;
             let fall = ErrorFall::measure(&known, &settings, &calibration);

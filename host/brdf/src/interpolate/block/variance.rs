@@ -14,6 +14,11 @@ fn kriging_variance(own: f32, uu: f32, zu: f32, zz: f32) -> f32 {
     (own - uu).max(0.0) + (1.0 - zu).powi(2) / zz.max(1e-12)
 }
 
+/// Vectors of places that are solved together …
+const TOGETHER: usize = 2;
+/// … for four rows of the factor at a time, or one for eight: eight sums stay in registers, and none waits for another.
+const SUMS: usize = 8;
+
 /// Appends the variances at places, channel by channel.
 pub(super) struct Variance<'a, K, const N: usize> {
     pub(super) kernel: &'a K,
@@ -25,82 +30,105 @@ pub(super) struct Variance<'a, K, const N: usize> {
 impl<K: Kernel, const N: usize> WithSimd for Variance<'_, K, N> {
     type Output = ();
 
-    /// Places in the lanes: `u = L⁻¹ k`, column by column of L, for a vector of places at once; then
-    /// `1 − uᵀu + (1 − zᵀu)² / zᵀz` with `z = L⁻¹ 1`, the last term for the unknown mean.
+    /// Places in the lanes: `u = L⁻¹ k` for vectors of places at once; then `1 − uᵀu + (1 − zᵀu)² / zᵀz` with
+    /// `z = L⁻¹ 1`, the last term for the unknown mean.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let s = self.process;
-        let (n, lanes) = (s.n, S::F32_LANES);
         let ones = s.norms.len() + N;
         let mut zz = 0.0f32;
-        for j in 0..n {
+        for j in 0..s.n {
             zz += s.matrix.column(j)[ones].powi(2);
         }
-        s.columns.resize(n * lanes, 0.0);
-        // Coordinates of the places, axis by axis, and their squared lengths, in seven vectors.
-        let mut buffer = [0.0f32; 8 * PAD];
-        let in_middle = s.drift.at(&s.middle);
-        for places in self.places.chunks(lanes) {
-            buffer.fill(0.0);
-            for (lane, point) in places.iter().enumerate() {
-                buffer[7 * lanes + lane] = s.drift.at(point) - in_middle;
-                for k in 0..6 {
-                    let x = (point[k] - s.middle[k]) * s.scale[k];
-                    buffer[k * lanes + lane] = x;
-                    buffer[6 * lanes + lane] += x * x;
-                }
-            }
-            let (vectors, _) = S::as_simd_f32s(&buffer);
-            let axes = Axes::<S> {
-                axes: [
-                    &vectors[0..1],
-                    &vectors[1..2],
-                    &vectors[2..3],
-                    &vectors[3..4],
-                    &vectors[4..5],
-                    &vectors[5..6],
-                ],
-                norms: &vectors[6..7],
-            };
-            let (u, _) = S::as_mut_simd_f32s(&mut s.columns);
-            for j in 0..n {
-                let mut datum = Place::<S>::at_origin(simd);
-                for k in 0..6 {
-                    datum.set(simd, k, s.axes[k][j]);
-                }
-                let slope = simd.splat_f32s(s.slope_variance * s.drifts[j]);
-                let [k] = correlations::<K, S, 1>(self.kernel, simd, &datum, &axes, 0);
-                u[j] = simd.mul_add_e_f32s(slope, vectors[7], k);
-            }
-            let mut uu = simd.splat_f32s(0.0);
-            let mut zu = simd.splat_f32s(0.0);
-            for j in 0..n {
-                let column = s.matrix.column(j);
-                let (done, rest) = u.split_at_mut(j + 1);
-                let x = simd.mul_f32s(done[j], simd.splat_f32s(1.0 / column[j]));
-                uu = simd.mul_add_e_f32s(x, x, uu);
-                zu = simd.mul_add_e_f32s(x, simd.splat_f32s(column[ones]), zu);
-                for (t, l) in rest.iter_mut().zip(&column[j + 1..n]) {
-                    *t = simd.mul_add_e_f32s(x, simd.splat_f32s(-*l), *t);
-                }
-            }
-            let mut out = [0.0f32; 2 * PAD];
-            {
-                let (vectors, _) = S::as_mut_simd_f32s(&mut out);
-                vectors[0] = uu;
-                vectors[1] = zu;
-            }
-            for lane in 0..places.len() {
-                let (uu, zu) = (out[lane], out[lanes + lane]);
-                let own = 1.0 + s.slope_variance * buffer[7 * lanes + lane].powi(2);
-                let kriging = kriging_variance(own, uu, zu, zz);
-                let mut variance = s.signal;
-                for c in 0..N {
-                    variance[c] *= kriging;
-                }
-                self.out.push(variance);
-            }
+        let wide = TOGETHER * S::F32_LANES;
+        let rest = self.places.len() % wide;
+        let (many, few) = self.places.split_at(self.places.len() - rest);
+        for places in many.chunks_exact(wide) {
+            variances::<K, S, N, { SUMS / TOGETHER }, TOGETHER>(
+                self.kernel,
+                simd,
+                s,
+                places,
+                zz,
+                self.out,
+            );
         }
+        for places in few.chunks(S::F32_LANES) {
+            variances::<K, S, N, SUMS, 1>(self.kernel, simd, s, places, zz, self.out);
+        }
+    }
+}
+
+/// Appends the variances at no more places than `P` vectors hold, by `R` rows of the factor at a time.
+#[inline(always)]
+fn variances<K: Kernel, S: Simd, const N: usize, const R: usize, const P: usize>(
+    kernel: &K,
+    simd: S,
+    s: &mut Process<N>,
+    places: &[Point],
+    zz: f32,
+    out: &mut Vec<[f32; N]>,
+) {
+    let (n, lanes) = (s.n, P * S::F32_LANES);
+    // The factor is padded by the unit matrix, and so are its right-hand sides by zeros.
+    let padded = s.norms.len();
+    let ones = padded + N;
+    s.columns.clear();
+    s.columns.resize(padded * lanes, 0.0);
+    // Coordinates of the places, axis by axis, their squared lengths, and the drift.
+    let mut buffer = [[0.0f32; TOGETHER * PAD]; 8];
+    let in_middle = s.drift.at(&s.middle);
+    for (lane, point) in places.iter().enumerate() {
+        buffer[7][lane] = s.drift.at(point) - in_middle;
+        for k in 0..6 {
+            let x = (point[k] - s.middle[k]) * s.scale[k];
+            buffer[k][lane] = x;
+            buffer[6][lane] += x * x;
+        }
+    }
+    let axes = Axes::<S> {
+        axes: [
+            S::as_simd_f32s(&buffer[0]).0,
+            S::as_simd_f32s(&buffer[1]).0,
+            S::as_simd_f32s(&buffer[2]).0,
+            S::as_simd_f32s(&buffer[3]).0,
+            S::as_simd_f32s(&buffer[4]).0,
+            S::as_simd_f32s(&buffer[5]).0,
+        ],
+        norms: S::as_simd_f32s(&buffer[6]).0,
+    };
+    let (drifts, _) = S::as_simd_f32s(&buffer[7]);
+    let (u, _) = S::as_mut_simd_f32s(&mut s.columns);
+    let (u, _) = u.as_chunks_mut::<P>();
+    for j in 0..n {
+        let mut datum = Place::<S>::at_origin(simd);
+        for k in 0..6 {
+            datum.set(simd, k, s.axes[k][j]);
+        }
+        let slope = simd.splat_f32s(s.slope_variance * s.drifts[j]);
+        let k = correlations::<K, S, P>(kernel, simd, &datum, &axes, 0);
+        for p in 0..P {
+            u[j][p] = simd.mul_add_e_f32s(slope, drifts[p], k[p]);
+        }
+    }
+    s.matrix.solve::<S, R, P>(simd, padded, u);
+    let mut sums = [[simd.splat_f32s(0.0); P]; 2];
+    for j in 0..n {
+        let one = simd.splat_f32s(s.matrix.column(j)[ones]);
+        for p in 0..P {
+            sums[0][p] = simd.mul_add_e_f32s(u[j][p], u[j][p], sums[0][p]);
+            sums[1][p] = simd.mul_add_e_f32s(u[j][p], one, sums[1][p]);
+        }
+    }
+    let mut found = [[0.0f32; TOGETHER * PAD]; 2];
+    for k in 0..2 {
+        let (vectors, _) = S::as_mut_simd_f32s(&mut found[k]);
+        vectors[..P].copy_from_slice(&sums[k]);
+    }
+    for lane in 0..places.len() {
+        let own = 1.0 + s.slope_variance * buffer[7][lane].powi(2);
+        let kriging = kriging_variance(own, found[0][lane], found[1][lane], zz);
+        out.push(s.signal.map(|signal| signal * kriging));
     }
 }
 

@@ -116,7 +116,7 @@ impl<const N: usize> Refiner<N> {
         self.part.logs.clear();
         self.fine.evaluate(&self.places, &mut self.part.logs);
         std::mem::swap(&mut self.fine, &mut self.compared);
-        self.compared_at = Some(at);
+        (self.fine_at, self.compared_at) = (None, Some(at));
         let logs = &self.part.logs;
         let pairs = self.logs.iter().flatten().zip(logs.iter().flatten());
         let squares: f32 = pairs.map(|(x, y)| (x - y).powi(2)).sum();

@@ -11,7 +11,7 @@ mod parts;
 mod places;
 mod predict;
 
-pub use predict::Predicted;
+pub use predict::{Predicted, part_of};
 
 use super::FillSettings;
 use super::blend::Shifts;
@@ -19,7 +19,7 @@ use super::block::Block;
 use super::block::kernel::{AnyKernel, NewBlock};
 use super::coordinates::Point;
 use super::datum::Datum;
-use super::from_corners::FromCorners;
+use super::from_corners::{FromCorners, weights_of};
 use super::hierarchy::{Detail, Found, Neighbours, keep_nearest};
 use super::patches::Patch;
 use crate::direction::Vec3;
@@ -30,6 +30,8 @@ pub struct Refiner<const N: usize = 3> {
     /// The block of the pair, and the one of a part.
     coarse: Box<dyn Block<N>>,
     fine: Box<dyn Block<N>>,
+    /// Where the fine block was fitted since the coarse one was.
+    fine_at: Option<(Vec3, Vec3)>,
     /// The fine block that the coarse one was compared with, and where it was fitted: should the pair be
     /// refined, it serves again.
     compared: Box<dyn Block<N>>,
@@ -37,6 +39,8 @@ pub struct Refiner<const N: usize = 3> {
     /// By how many standard deviations of a sample the coarse block may be off in each pair of parts; none
     /// where its variance is below the limit.
     deviations: Vec<f32>,
+    /// Whether any part of the pair that predictions are made in has a block of its own.
+    refines: bool,
     /// Merged data whose bins are looked at.
     near: Vec<Found>,
     found: Vec<Found>,
@@ -92,9 +96,11 @@ impl<const N: usize> Refiner<N> {
         Self {
             coarse: NewBlock::<N>::new_block(settings.kernel),
             fine: NewBlock::<N>::new_block(settings.kernel),
+            fine_at: None,
             compared: NewBlock::<N>::new_block(settings.kernel),
             compared_at: None,
             deviations: Vec::new(),
+            refines: false,
             near: Vec::new(),
             found: Vec::new(),
             neighbourhood: Vec::new(),
@@ -125,11 +131,19 @@ impl<const N: usize> Refiner<N> {
             return self.solved(false, Some(refined));
         }
         let is_smooth = self.follows_from_corners(settings, pair);
-        if !is_smooth || with_variances {
-            write_places(settings, pair, &mut self.places);
-            self.coarse.evaluate(&self.places, &mut self.logs);
+        match weights_of(pair.0, pair.1) {
+            Some(weights) if is_smooth && with_variances => {
+                let cells = (pair.0.directions.len(), pair.1.directions.len());
+                self.from_corners.write(weights, cells, &mut self.logs);
+            }
+            _ if is_smooth => {}
+            _ => {
+                write_places(settings, pair, &mut self.places);
+                self.coarse.evaluate(&self.places, &mut self.logs);
+            }
         }
         if with_variances {
+            write_places(settings, pair, &mut self.places);
             self.coarse.variances_at(&self.places, &mut self.variances);
         }
         self.solved(is_smooth, None)
@@ -155,7 +169,7 @@ impl<const N: usize> Refiner<N> {
         let centre = settings.coordinates.point(p.centre, q.centre);
         let neighbours = settings.coarse_neighbours();
         data.around(&centre, neighbours, &mut self.found);
-        self.compared_at = None;
+        (self.fine_at, self.compared_at) = (None, None);
         let radius = keep_nearest(&mut self.found, neighbours);
         self.gather(data, Detail::Merged);
         self.coarse
@@ -163,6 +177,20 @@ impl<const N: usize> Refiner<N> {
         write_corners(settings, (p, q), &mut self.places);
         self.corners.clear();
         self.coarse.evaluate(&self.places, &mut self.corners);
+    }
+
+    /// Makes the fine block that around a pair of directions, unless it is or the coarse one was compared with it.
+    fn make_fine(&mut self, data: &impl Neighbours<N>, settings: &FillSettings, at: (Vec3, Vec3)) {
+        if self.fine_at == Some(at) {
+            return;
+        }
+        if self.compared_at == Some(at) {
+            std::mem::swap(&mut self.fine, &mut self.compared);
+            std::mem::swap(&mut self.fine_at, &mut self.compared_at);
+        } else {
+            self.fit_fine(data, settings, at);
+            self.fine_at = Some(at);
+        }
     }
 
     /// A fine block around a pair of directions, through the bins' own data.

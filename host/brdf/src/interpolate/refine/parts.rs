@@ -94,12 +94,7 @@ impl<const N: usize> Refiner<N> {
         with_variances: bool,
     ) {
         let at = (a.patch.centre, b.patch.centre);
-        if self.compared_at == Some(at) {
-            std::mem::swap(&mut self.fine, &mut self.compared);
-            self.compared_at = None;
-        } else {
-            self.fit_fine(data, settings, at);
-        }
+        self.make_fine(data, settings, at);
         let (pair, part) = ((&a.patch, &b.patch), &mut self.part);
         write_corners(settings, pair, &mut self.places);
         self.fine.evaluate(&self.places, &mut part.corners);

@@ -21,28 +21,37 @@ pub struct Predicted<'a, const N: usize = 3> {
 const MEAN_OF: usize = 8;
 
 impl<const N: usize> Refiner<N> {
-    /// The natural logarithms at places of a pair: what [`Self::solve`] would give for cells there. The
-    /// block is that of the first of them; of the others those are kept that it serves for too.
-    /// Variances are not calibrated.
+    /// Fits the coarse block of a pair and finds which of its parts get one of their own, for any number of calls of
+    /// [`Self::predict`].
+    pub fn prepare(
+        &mut self,
+        data: &impl Neighbours<N>,
+        settings: &FillSettings,
+        pair: (&Patch, &Patch),
+    ) {
+        self.fit_coarse(data, settings, pair);
+        self.refines = self.needs_refinement(data, settings, pair);
+    }
+
+    /// The natural logarithms at places of the pair that [`Self::prepare`] was called with: what [`Self::solve`] would
+    /// give for cells there. The block is that of the first of them; of the others those are kept that it serves for too.
+    /// Variances are not calibrated. Calls one after the other in the same [`part_of`] the pair share its block.
     pub fn predict(
         &mut self,
         data: &impl Neighbours<N>,
         settings: &FillSettings,
-        (p, q): (&Patch, &Patch),
+        pair: (&Patch, &Patch),
         places: &mut Vec<impl AsRef<(Vec3, Vec3)>>,
     ) -> Predicted<'_, N> {
-        self.fit_coarse(data, settings, (p, q));
-        let refines = self.needs_refinement(data, settings, (p, q));
-        let part_of = |(light, view): (Vec3, Vec3)| {
-            Some(nearest_part(p, light)? * q.parts.len() + nearest_part(q, view)?)
-        };
         let has_own = |number: Option<usize>| {
-            refines && number.is_some_and(|number| self.exceeds_tolerance(settings, number))
+            self.refines && number.is_some_and(|number| self.exceeds_tolerance(settings, number))
         };
-        let first = places.first().and_then(|place| part_of(*place.as_ref()));
+        let first = places
+            .first()
+            .and_then(|place| part_of(pair, *place.as_ref()));
         let is_fine = has_own(first);
         places.retain(|place| {
-            let part = part_of(*place.as_ref());
+            let part = part_of(pair, *place.as_ref());
             if is_fine {
                 part == first
             } else {
@@ -51,9 +60,10 @@ impl<const N: usize> Refiner<N> {
         });
         let block = match first {
             Some(number) if is_fine => {
+                let (p, q) = pair;
                 let (a, b) = (number / q.parts.len(), number % q.parts.len());
                 let at = (p.parts[a].patch.centre, q.parts[b].patch.centre);
-                self.fit_fine(data, settings, at);
+                self.make_fine(data, settings, at);
                 &mut self.fine
             }
             _ => &mut self.coarse,
@@ -77,6 +87,11 @@ impl<const N: usize> Refiner<N> {
             variance_of_mean: block.variance_of_mean(&self.places),
         }
     }
+}
+
+/// The number of the pair of parts that a pair of directions is in; `None` where patches have no parts.
+pub fn part_of((p, q): (&Patch, &Patch), (light, view): (Vec3, Vec3)) -> Option<usize> {
+    Some(nearest_part(p, light)? * q.parts.len() + nearest_part(q, view)?)
 }
 
 /// The number of the part of a patch whose centre is nearest to a direction.
