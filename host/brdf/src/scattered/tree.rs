@@ -1,0 +1,240 @@
+//! A balanced tree over places, and the nearest of them: leaf by leaf, many distances at a time.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// A place that is searched for: six coordinates.
+pub(super) type At = [f32; 6];
+
+/// Places of a leaf, at most.
+const LEAF: usize = 32;
+/// So many parts of the tree wait to be looked at, at most: one a level.
+const DEPTH_MAX: usize = 32;
+
+/// The corner of a box with the smallest coordinates, and the one with the largest.
+type Bounds = [At; 2];
+
+/// Places of a leaf, axis by axis, and their numbers; beyond the last one no coordinate is a number.
+struct Leaf {
+    at: [[f32; LEAF]; 6],
+    numbers: [u32; LEAF],
+}
+
+/// The tree: each part is halved across its longest side, so often that the halves fit leaves.
+pub(super) struct Tree {
+    /// Bounds of the whole, of its halves, of theirs and so on.
+    bounds: Vec<Bounds>,
+    leaves: Vec<Leaf>,
+    arch: Arch,
+}
+
+/// What is nearest, of one search or of several that compete: places by number, each with the number of the search.
+pub(super) struct Nearest {
+    many: usize,
+    /// Squared distance, number of the place, number of the search, in this order of significance: squared distances are
+    /// not negative, so that their bits are in their order.
+    found: Vec<(u32, u32, u32)>,
+    /// None farther than this counts.
+    within: f32,
+}
+
+impl Nearest {
+    /// So many.
+    pub fn new(many: usize) -> Self {
+        Self {
+            many: many.max(1),
+            found: Vec::with_capacity(2 * many + LEAF),
+            within: f32::INFINITY,
+        }
+    }
+
+    /// Number of the place, and of the search, in no order.
+    pub fn found(mut self) -> impl Iterator<Item = (u32, u32)> {
+        self.drop_far();
+        self.found
+            .into_iter()
+            .map(|(_, number, search)| (number, search))
+    }
+
+    /// Keeps as many as are wanted.
+    fn drop_far(&mut self) {
+        if self.found.len() > self.many {
+            let (_, last, _) = self.found.select_nth_unstable(self.many - 1);
+            self.within = f32::from_bits(last.0);
+            self.found.truncate(self.many);
+        }
+    }
+}
+
+impl Tree {
+    /// Of places by their number.
+    pub fn new(places: &[At]) -> Self {
+        let mut all: Vec<(At, u32)> = places.iter().copied().zip(0u32..).collect();
+        let depth = all.len().div_ceil(LEAF).next_power_of_two().ilog2();
+        let mut tree = Self {
+            bounds: vec![[[f32::INFINITY; 6], [f32::NEG_INFINITY; 6]]; (2 << depth) - 1],
+            leaves: Vec::with_capacity(1 << depth),
+            arch: Arch::new(),
+        };
+        tree.split(&mut all, 0, depth);
+        tree
+    }
+
+    fn split(&mut self, places: &mut [(At, u32)], part: usize, depth: u32) {
+        let [mut low, mut high] = self.bounds[part];
+        for (at, _) in places.iter() {
+            for axis in 0..6 {
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis]);
+            }
+        }
+        self.bounds[part] = [low, high];
+        if depth == 0 {
+            let mut leaf = Leaf {
+                at: [[f32::NAN; LEAF]; 6],
+                numbers: [0; LEAF],
+            };
+            for (k, (at, number)) in places.iter().enumerate() {
+                leaf.numbers[k] = *number;
+                for axis in 0..6 {
+                    leaf.at[axis][k] = at[axis];
+                }
+            }
+            self.leaves.push(leaf);
+            return;
+        }
+        let length = |axis: &usize| high[*axis] - low[*axis];
+        let longest = (0..6).max_by(|a, b| length(a).total_cmp(&length(b)));
+        let axis = longest.unwrap_or(0);
+        let half = places.len() / 2;
+        if half > 0 {
+            let order = |a: &(At, u32), b: &(At, u32)| a.0[axis].total_cmp(&b.0[axis]);
+            places.select_nth_unstable_by(half, order);
+        }
+        let (first, second) = places.split_at_mut(half);
+        self.split(first, 2 * part + 1, depth - 1);
+        self.split(second, 2 * part + 2, depth - 1);
+    }
+
+    /// Adds to what is nearest, as what a search with this number finds around a place.
+    pub fn search(&self, place: At, search: u32, nearest: &mut Nearest) {
+        self.arch.dispatch(Searched {
+            tree: self,
+            place,
+            search,
+            nearest,
+        });
+    }
+}
+
+struct Searched<'a> {
+    tree: &'a Tree,
+    place: At,
+    search: u32,
+    nearest: &'a mut Nearest,
+}
+
+impl WithSimd for Searched<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { tree, place, .. } = self;
+        let nearest = self.nearest;
+        let first_leaf = tree.leaves.len() - 1;
+        // Parts that are left to be looked at, and how far they are.
+        let mut waiting = [(0usize, 0f32); DEPTH_MAX];
+        let mut many = 1;
+        while many > 0 {
+            many -= 1;
+            let (mut part, distance2) = waiting[many];
+            if distance2 > nearest.within {
+                continue;
+            }
+            while part < first_leaf {
+                let halves = [2 * part + 1, 2 * part + 2];
+                let [a, b] = halves.map(|half| beyond(&tree.bounds[half], &place));
+                let (near, far) = match a <= b {
+                    true => ((halves[0], a), (halves[1], b)),
+                    false => ((halves[1], b), (halves[0], a)),
+                };
+                if far.1 <= nearest.within {
+                    waiting[many] = far;
+                    many += 1;
+                }
+                part = near.0;
+            }
+            if beyond(&tree.bounds[part], &place) > nearest.within {
+                continue;
+            }
+            let leaf = &tree.leaves[part - first_leaf];
+            let mut squares = [0f32; LEAF];
+            for axis in 0..6 {
+                for k in 0..LEAF {
+                    let off = leaf.at[axis][k] - place[axis];
+                    squares[k] += off * off;
+                }
+            }
+            for k in 0..LEAF {
+                // Of what is no number this does not hold.
+                if squares[k] <= nearest.within {
+                    let found = (squares[k].to_bits(), leaf.numbers[k], self.search);
+                    nearest.found.push(found);
+                }
+            }
+            if nearest.found.len() >= 2 * nearest.many {
+                nearest.drop_far();
+            }
+        }
+    }
+}
+
+/// The square of how far a place is from a box.
+#[inline(always)]
+fn beyond([low, high]: &Bounds, place: &At) -> f32 {
+    let mut sum = 0.0;
+    for axis in 0..6 {
+        let off = (low[axis] - place[axis])
+            .max(place[axis] - high[axis])
+            .max(0.0);
+        sum += off * off;
+    }
+    sum
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn what_is_found_is_nearest_by_one_search_and_by_several() {
+        let mut random = Random::new(4);
+        let mut at = || [0; 6].map(|_| random.between(-1.0, 1.0) as f32);
+        for count in [0, 1, 31, 33, 70, 1000] {
+            // Every place is there twice.
+            let half: Vec<At> = (0..count).map(|_| at()).collect();
+            let places = [&half[..], &half[..]].concat();
+            let tree = Tree::new(&places);
+            let queries = [at(), at()];
+            for many in [1, 8, 200] {
+                let mut nearest = Nearest::new(many);
+                let mut all = Vec::new();
+                for (search, query) in (0u32..).zip(&queries) {
+                    tree.search(*query, search, &mut nearest);
+                    all.extend((0u32..).zip(&places).map(|(number, place)| {
+                        let off = (0..6).map(|k| (place[k] - query[k]) * (place[k] - query[k]));
+                        (off.fold(0f32, |a, b| a + b).to_bits(), number, search)
+                    }));
+                }
+                all.sort_unstable();
+                all.truncate(many);
+                let mut expected: Vec<(u32, u32)> = all.iter().map(|f| (f.1, f.2)).collect();
+                let mut found: Vec<(u32, u32)> = nearest.found().collect();
+                expected.sort_unstable();
+                found.sort_unstable();
+                assert_eq!(found, expected, "{count} {many}");
+            }
+        }
+    }
+}
