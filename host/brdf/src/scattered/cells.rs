@@ -3,6 +3,7 @@
 
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
+use super::narrow::Narrow;
 use super::places::{Near, distance2, exchanged, radius_of};
 use super::planes::{Block, Rows, planes_of, three};
 use super::quadratic::{Cells, Few, Nodes, weights};
@@ -28,6 +29,8 @@ const ONE_SYSTEM: usize = 192;
 const TOLERANCE: f64 = 0.25;
 /// … or than this share of the value.
 const TOLERANCE_MIN: f64 = 1e-3;
+/// So much of the tolerance may be due to single precision.
+const NARROW: f64 = 0.2;
 /// So many cells are not worth a test.
 const DIRECT: usize = 40;
 /// Cells whose reach is beyond so many times what they may share, by the radius around those that they are half of, are
@@ -64,12 +67,23 @@ impl Systems {
 /// Cells that share systems, and what holds for all of them.
 struct Shares<'a> {
     systems: &'a Systems,
+    /// The same in single precision, where that is near enough.
+    narrow: Option<Narrow>,
     pair: &'a Cells,
     cells: Cells,
     /// What logarithms may be off by.
     tolerance: f64,
     /// Relative standard errors at the nodes, channel by channel, where errors are wanted.
     errors: Vec<Vec<f64>>,
+}
+
+impl Shares<'_> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+        match &self.narrow {
+            Some(narrow) => self.systems.own.logs_of(narrow.sums(place)),
+            None => self.systems.logs_at(place, work),
+        }
+    }
 }
 
 /// Memory of one thread.
@@ -270,7 +284,7 @@ impl Filler<'_> {
             return;
         }
         if let Some(one) = &self.one {
-            return self.share(one, pair, cells, memory);
+            return self.share(one, pair, (cells, f64::INFINITY), memory);
         }
         let middle = self.place(cells.middle());
         let reach = (0..16)
@@ -289,7 +303,7 @@ impl Filler<'_> {
         if cells.count() > 1 && reach > SHARED * near.radius() {
             halve(near.radius(), memory);
         } else if let Some(systems) = self.systems(&near) {
-            self.share(&systems, pair, cells, memory);
+            self.share(&systems, pair, (cells, reach), memory);
         }
     }
 
@@ -316,8 +330,16 @@ impl Filler<'_> {
         longest.unwrap_or(0)
     }
 
-    fn share(&self, systems: &Systems, pair: &Cells, cells: Cells, memory: &mut Memory) {
-        let middle = systems.at(&self.place(cells.middle()), true, &mut memory.work);
+    /// Fills cells, none of which is farther from their middle than they reach, by systems that they share.
+    fn share(
+        &self,
+        systems: &Systems,
+        pair: &Cells,
+        (cells, reach): (Cells, f64),
+        memory: &mut Memory,
+    ) {
+        let at = self.place(cells.middle());
+        let middle = systems.at(&at, true, &mut memory.work);
         let relative = middle
             .relative
             .iter()
@@ -327,11 +349,15 @@ impl Filler<'_> {
             true => self.errors(systems, &cells, &mut memory.work),
             false => vec![Vec::new(); self.channels],
         };
+        let tolerance = TOLERANCE * self.fit.choice.error_factor * relative;
+        let tolerance = tolerance.max(TOLERANCE_MIN);
+        let narrow = || systems.own.narrow((at, reach), NARROW * tolerance);
         let shares = Shares {
             systems,
+            narrow: systems.reciprocal.is_none().then(narrow).flatten(),
             pair,
             cells,
-            tolerance: (TOLERANCE * self.fit.choice.error_factor * relative).max(TOLERANCE_MIN),
+            tolerance,
             errors,
         };
         self.refine(&shares, cells, memory);
@@ -394,7 +420,7 @@ impl Filler<'_> {
                     let n_phi = self.grid.n_phi();
                     let [l, v] = [*light, *view].map(|d| [d / n_phi, d % n_phi].map(|x| x as f64));
                     let place = self.place([l[0], l[1], v[0], v[1]]);
-                    let logs = shares.systems.logs_at(&place, &mut memory.work);
+                    let logs = shares.logs_at(&place, &mut memory.work);
                     for (values, log) in channels.iter_mut().zip(logs) {
                         values.push(log);
                     }
@@ -441,7 +467,7 @@ impl Filler<'_> {
         lines: &Lines,
         work: &mut Work,
     ) -> Vec<Vec<f64>> {
-        let mut logs = |place: Pair| shares.systems.logs_at(&place, work);
+        let mut logs = |place: Pair| shares.logs_at(&place, work);
         if (0..4).all(|axis| part.length(axis) > 2) {
             self.few_nodes(part, (lines.middle, lines.ends), &mut logs)
         } else {
@@ -479,7 +505,7 @@ impl Filler<'_> {
     }
 
     fn lines(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> Lines {
-        let mut logs = |at: [f64; 4]| shares.systems.logs_at(&self.place(at), work);
+        let mut logs = |at: [f64; 4]| shares.logs_at(&self.place(at), work);
         let at = part.middle();
         let middle = logs(at);
         let mut ends = [[middle; 2]; 4];
@@ -537,7 +563,7 @@ impl Filler<'_> {
                 };
                 aside.end[axis] = aside.start[axis] + 1;
             }
-            let found = shares.systems.logs_at(&self.place(aside.middle()), work);
+            let found = shares.logs_at(&self.place(aside.middle()), work);
             nodes.iter().zip(found).all(|(values, found)| {
                 let mut between = Vec::with_capacity(1);
                 let nodes = Nodes {

@@ -1,6 +1,7 @@
 //! A kriging system through the data around a place, in double precision.
 
 use super::data::Datum;
+use super::narrow::Narrow;
 use super::nugget::{largest_nugget, likely_nugget};
 use super::places::Near;
 use super::wide::{Axes, Correlations, Covariance, Factor, Noise, covariances, dot};
@@ -36,6 +37,13 @@ struct Channel {
     /// Variance of the process, by maximum likelihood.
     signal: f64,
     limits: (f64, f64),
+}
+
+impl Channel {
+    /// What is kriged, from the sum of covariances by their weights.
+    fn within(&self, sum: f64) -> f64 {
+        (self.mean + sum).clamp(self.limits.0, self.limits.1)
+    }
 }
 
 /// Memory for the covariances of a place.
@@ -211,10 +219,29 @@ impl Local {
         logs
     }
 
+    /// [`Self::logs_at`] in single precision for places within a distance from a middle; `None` where they may be off by
+    /// more than this.
+    pub fn narrow(&self, around: (Pair, f64), off: f64) -> Option<Narrow> {
+        if self.response == Response::Linear {
+            return None;
+        }
+        let places = (0..self.at.len()).map(|k| self.at.place(k));
+        let weights = self.channels.iter().map(|c| &c.weights[..]);
+        Narrow::new(self.arch, self.covariance, places, weights, around, off)
+    }
+
+    /// [`Self::logs_at`] of the sums of covariances by their weights.
+    pub fn logs_of(&self, sums: [f64; 3]) -> [f64; 3] {
+        let mut logs = sums;
+        for (log, channel) in logs.iter_mut().zip(&self.channels) {
+            *log = channel.within(*log) + self.below(channel);
+        }
+        logs
+    }
+
     /// What is kriged, at the place with these covariances.
     fn fitted(&self, channel: &Channel, covariances: &[f64]) -> f64 {
-        let fitted = channel.mean + dot(self.arch, covariances, &channel.weights);
-        fitted.clamp(channel.limits.0, channel.limits.1)
+        channel.within(dot(self.arch, covariances, &channel.weights))
     }
 
     /// Noise that is as much above as below lies lower in logarithms, by half its variance.

@@ -12,6 +12,7 @@ mod left_out;
 mod local;
 mod merge;
 mod mirror;
+mod narrow;
 mod nugget;
 mod places;
 mod planes;

@@ -50,7 +50,7 @@ impl Axes {
     }
 
     #[inline(always)]
-    fn place(&self, k: usize) -> Pair {
+    pub fn place(&self, k: usize) -> Pair {
         let rows = padded(self.n);
         let at = |axis: usize| self.all[axis * rows + k];
         [at(0), at(1), at(2), at(3), at(4), at(5)]
