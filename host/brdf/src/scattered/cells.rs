@@ -6,7 +6,7 @@ use super::local::{Local, Predicted, Work};
 use super::narrow::Narrow;
 use super::places::{Near, distance2, exchanged, radius_of};
 use super::planes::{Block, Rows, planes_of, three};
-use super::quadratic::{Cells, Few, Nodes, weights};
+use super::quadratic::{By, Cells, Determined, Few, Stages, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
 use crate::direction::Direction;
@@ -90,7 +90,7 @@ impl Shares<'_> {
 #[derive(Default)]
 struct Memory {
     work: Work,
-    values: Vec<f64>,
+    stages: Stages,
     relative: Vec<f64>,
     /// Values and errors of the pair of patches that is worked on.
     block: Block,
@@ -384,7 +384,8 @@ impl Filler<'_> {
                     logs(self.place(place))
                 })
             });
-            self.few_nodes(cells, (middle, ends), &mut logs)
+            let few = self.few_nodes(cells, (middle, ends), &mut logs);
+            few.iter().map(|few| few.all(self.arch)).collect()
         } else {
             self.all_nodes(cells, &mut logs)
         };
@@ -434,19 +435,20 @@ impl Filler<'_> {
         let lines = self.lines(shares, &part, &mut memory.work);
         let bends = lines.bends;
         if lines.are_quadratic {
-            let mut nodes = self.nodes(shares, &part, &lines, &mut memory.work);
-            if self.meets_between(shares, &part, &nodes, &mut memory.work) {
-                for values in &mut nodes {
-                    memory.values.clear();
-                    let between = Nodes {
+            let (by, mut channels) = self.nodes(shares, &part, &lines, &mut memory.work);
+            if self.meets_between(shares, &part, (by, &channels), &mut memory.work) {
+                for values in &mut channels {
+                    let of = Determined {
                         cells: &part,
+                        by,
                         values,
                     };
-                    between.between(&part, &mut memory.values);
-                    exponentials(self.arch, &mut memory.values);
-                    std::mem::swap(values, &mut memory.values);
+                    let mut found = Vec::with_capacity(part.count());
+                    of.between(self.arch, &part, &mut memory.stages, &mut found);
+                    exponentials(self.arch, &mut found);
+                    *values = found;
                 }
-                return self.store(shares, part, &nodes, memory);
+                return self.store(shares, part, &channels, memory);
             }
         }
         let sharpest = (0..4).max_by(|a, b| bends[*a].total_cmp(&bends[*b]));
@@ -459,30 +461,32 @@ impl Filler<'_> {
         }
     }
 
-    /// Logarithms at all nodes of a part, channel by channel.
+    /// What determines the logarithms of a part, channel by channel.
     fn nodes(
         &self,
         shares: &Shares<'_>,
         part: &Cells,
         lines: &Lines,
         work: &mut Work,
-    ) -> Vec<Vec<f64>> {
+    ) -> (By, Vec<Vec<f64>>) {
         let mut logs = |place: Pair| shares.logs_at(&place, work);
         if (0..4).all(|axis| part.length(axis) > 2) {
-            self.few_nodes(part, (lines.middle, lines.ends), &mut logs)
+            let few = self.few_nodes(part, (lines.middle, lines.ends), &mut logs);
+            let powers = few.iter().map(|few| few.powers().to_vec());
+            (By::Powers, powers.collect())
         } else {
-            self.all_nodes(part, &mut logs)
+            (By::Nodes, self.all_nodes(part, &mut logs))
         }
     }
 
-    /// Values at all nodes of cells of more than two along each axis, by those in the middle, at the ends of the lines
-    /// through it, and at the corners.
+    /// Of cells of more than two along each axis, values in the middle, at the ends of the lines through it, and at the
+    /// corners, channel by channel.
     fn few_nodes(
         &self,
         cells: &Cells,
         (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
         at: &mut impl FnMut(Pair) -> [f64; 3],
-    ) -> Vec<Vec<f64>> {
+    ) -> Vec<Few> {
         let corners: [[f64; 3]; 16] =
             std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
         let few = |c: usize| Few {
@@ -490,7 +494,7 @@ impl Filler<'_> {
             ends: ends.map(|ends| ends.map(|end| end[c])),
             corners: corners.map(|corner| corner[c]),
         };
-        (0..self.channels).map(|c| few(c).all()).collect()
+        (0..self.channels).map(few).collect()
     }
 
     /// Values at all nodes of cells, each computed.
@@ -548,31 +552,27 @@ impl Filler<'_> {
         &self,
         shares: &Shares<'_>,
         part: &Cells,
-        nodes: &[Vec<f64>],
+        (by, channels): (By, &[Vec<f64>]),
         work: &mut Work,
     ) -> bool {
         // Half of the corners of a box of half the size.
         let asides = (0..16usize).filter(|bits| bits.count_ones() % 2 == 0);
         asides.into_iter().all(|bits| {
-            let mut aside = *part;
-            for axis in 0..4 {
+            let cell = [0, 1, 2, 3].map(|axis| {
                 let quarter = part.length(axis) / 4;
-                aside.start[axis] = match bits >> axis & 1 {
+                match bits >> axis & 1 {
                     0 => part.start[axis] + quarter,
                     _ => part.end[axis] - 1 - quarter,
-                };
-                aside.end[axis] = aside.start[axis] + 1;
-            }
-            let found = shares.logs_at(&self.place(aside.middle()), work);
-            nodes.iter().zip(found).all(|(values, found)| {
-                let mut between = Vec::with_capacity(1);
-                let nodes = Nodes {
+                }
+            });
+            let found = shares.logs_at(&self.place(cell.map(|x| x as f64)), work);
+            channels.iter().zip(found).all(|(values, found)| {
+                let of = Determined {
                     cells: part,
+                    by,
                     values,
                 };
-                nodes.between(&aside, &mut between);
-                let off = |between: &f64| (between - found).abs();
-                between.iter().all(|b| off(b) <= shares.tolerance)
+                (of.at(cell) - found).abs() <= shares.tolerance
             })
         })
     }
@@ -583,12 +583,13 @@ impl Filler<'_> {
             if !self.with_errors {
                 continue;
             }
-            memory.relative.clear();
-            let between = Nodes {
+            let of = Determined {
                 cells: &shares.cells,
+                by: By::Nodes,
                 values: &shares.errors[c],
             };
-            between.between(&part, &mut memory.relative);
+            let (stages, relative) = (&mut memory.stages, &mut memory.relative);
+            of.between(self.arch, &part, stages, relative);
             exponentials(self.arch, &mut memory.relative);
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;
