@@ -1,5 +1,6 @@
 //! A balanced tree over places, and the nearest of them: leaf by leaf, many distances at a time.
 
+use pulp::bytemuck::cast_slice;
 use pulp::{Arch, Simd, WithSimd};
 
 /// A place that is searched for: six coordinates.
@@ -9,6 +10,8 @@ pub(super) type At = [f32; 6];
 const LEAF: usize = 32;
 /// So many parts of the tree wait to be looked at, at most: one a level.
 const DEPTH_MAX: usize = 32;
+/// So many searches compete, at most.
+const SEARCHES: u32 = 8;
 
 /// The corner of a box with the smallest coordinates, and the one with the largest.
 type Bounds = [At; 2];
@@ -32,7 +35,7 @@ pub(super) struct Nearest {
     many: usize,
     /// Squared distance, number of the place, number of the search, in this order of significance: squared distances are
     /// not negative, so that their bits are in their order.
-    found: Vec<(u32, u32, u32)>,
+    found: Vec<u64>,
     /// None farther than this counts.
     within: f32,
 }
@@ -50,23 +53,24 @@ impl Nearest {
     /// Number of the place, and of the search, in no order.
     pub fn found(mut self) -> impl Iterator<Item = (u32, u32)> {
         self.drop_far();
-        self.found
-            .into_iter()
-            .map(|(_, number, search)| (number, search))
+        self.found.into_iter().map(|found| {
+            let number = found as u32;
+            (number / SEARCHES, number % SEARCHES)
+        })
     }
 
     /// Keeps as many as are wanted.
     fn drop_far(&mut self) {
         if self.found.len() > self.many {
             let (_, last, _) = self.found.select_nth_unstable(self.many - 1);
-            self.within = f32::from_bits(last.0);
+            self.within = f32::from_bits((*last >> 32) as u32);
             self.found.truncate(self.many);
         }
     }
 }
 
 impl Tree {
-    /// Of places by their number.
+    /// Of places by their number, below 2²⁹.
     pub fn new(places: &[At]) -> Self {
         let mut all: Vec<(At, u32)> = places.iter().copied().zip(0u32..).collect();
         let depth = all.len().div_ceil(LEAF).next_power_of_two().ilog2();
@@ -115,7 +119,7 @@ impl Tree {
         self.split(second, 2 * part + 2, depth - 1);
     }
 
-    /// Adds to what is nearest, as what a search with this number finds around a place.
+    /// Adds to what is nearest, as what a search with this number (0 ..= 7) finds around a place.
     pub fn search(&self, place: At, search: u32, nearest: &mut Nearest) {
         self.arch.dispatch(Searched {
             tree: self,
@@ -137,8 +141,9 @@ impl WithSimd for Searched<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { tree, place, .. } = self;
+        let at = place.map(|x| simd.splat_f32s(x));
         let nearest = self.nearest;
         let first_leaf = tree.leaves.len() - 1;
         // Parts that are left to be looked at, and how far they are.
@@ -167,18 +172,27 @@ impl WithSimd for Searched<'_> {
                 continue;
             }
             let leaf = &tree.leaves[part - first_leaf];
-            let mut squares = [0f32; LEAF];
-            for axis in 0..6 {
-                for k in 0..LEAF {
-                    let off = leaf.at[axis][k] - place[axis];
-                    squares[k] += off * off;
+            for group in 0..LEAF / S::F32_LANES {
+                let mut wide = simd.splat_f32s(0.0);
+                for axis in 0..6 {
+                    let off = simd.sub_f32s(S::as_simd_f32s(&leaf.at[axis]).0[group], at[axis]);
+                    wide = simd.add_f32s(wide, simd.mul_f32s(off, off));
                 }
-            }
-            for k in 0..LEAF {
                 // Of what is no number this does not hold.
-                if squares[k] <= nearest.within {
-                    let found = (squares[k].to_bits(), leaf.numbers[k], self.search);
-                    nearest.found.push(found);
+                let within = simd.splat_f32s(nearest.within);
+                let is_near = simd.less_than_or_equal_f32s(wide, within);
+                if simd.first_true_m32s(is_near) == S::F32_LANES {
+                    continue;
+                }
+                let wide = [wide];
+                let squares: &[f32] = cast_slice(&wide);
+                let numbers = &leaf.numbers[group * S::F32_LANES..];
+                for (square, number) in squares.iter().zip(numbers) {
+                    if *square <= nearest.within {
+                        let number = u64::from(number * SEARCHES + self.search);
+                        let found = u64::from(square.to_bits()) << 32 | number;
+                        nearest.found.push(found);
+                    }
                 }
             }
             if nearest.found.len() >= 2 * nearest.many {
