@@ -207,9 +207,9 @@ impl WithSimd for Searched<'_> {
 fn beyond([low, high]: &Bounds, place: &At) -> f32 {
     let mut sum = 0.0;
     for axis in 0..6 {
-        let off = (low[axis] - place[axis])
-            .max(place[axis] - high[axis])
-            .max(0.0);
+        let (below, above) = (low[axis] - place[axis], place[axis] - high[axis]);
+        let off = if below > above { below } else { above };
+        let off = if off > 0.0 { off } else { 0.0 };
         sum += off * off;
     }
     sum

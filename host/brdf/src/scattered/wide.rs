@@ -150,14 +150,20 @@ impl Factor {
         2.0 * pivots.sum::<f64>()
     }
 
-    /// `x = L⁻¹ x`.
-    pub fn forward(&self, arch: Arch, x: &mut [f64]) {
+    /// `x = L⁻¹ x` of each.
+    pub fn forward<const R: usize>(&self, arch: Arch, x: [&mut [f64]; R]) {
         arch.dispatch(Forward(self, x));
     }
 
-    /// `x = L⁻ᵀ x`.
-    pub fn backward(&self, arch: Arch, x: &mut [f64]) {
-        arch.dispatch(Backward(self, x));
+    /// `x = L⁻ᵀ x` of each.
+    pub fn backward<const R: usize>(&self, arch: Arch, mut x: [&mut Vec<f64>; R]) {
+        for x in &mut x {
+            x.resize(padded(self.n), 0.0);
+        }
+        arch.dispatch(Backward(self, x.each_mut().map(|x| &mut x[..])));
+        for x in &mut x {
+            x.truncate(self.n);
+        }
     }
 }
 
@@ -390,40 +396,77 @@ fn factor_panel<S: Simd>(simd: S, panel: &mut [f64], j: usize, rows: usize) -> b
     true
 }
 
-struct Forward<'a>(&'a Factor, &'a mut [f64]);
+struct Forward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
 
-impl WithSimd for Forward<'_> {
+impl<const R: usize> WithSimd for Forward<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self(Factor { n, l }, x) = self;
+        let Self(Factor { n, l }, all) = self;
         let rows = padded(*n);
         for (j, column) in l.chunks_exact(rows).enumerate() {
-            let first = x[j] / column[j];
             // What is above the diagonal is zero.
             let from = j / WIDTH * WIDTH;
-            subtract(simd, &mut x[from..], &column[from..*n], first);
-            x[j] = first;
+            for r in 0..R {
+                let x = &mut *all[r];
+                let first = x[j] / column[j];
+                subtract(simd, &mut x[from..], &column[from..*n], first);
+                x[j] = first;
+            }
         }
     }
 }
 
-struct Backward<'a>(&'a Factor, &'a mut [f64]);
+struct Backward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
 
-impl WithSimd for Backward<'_> {
+impl<const R: usize> WithSimd for Backward<'_, R> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self(Factor { n, l }, x) = self;
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self(Factor { n, l }, all) = self;
         let rows = padded(*n);
-        for j in (0..*n).rev() {
-            let column = &l[j * rows + j..j * rows + n];
-            let below = sum_of_products(&column[1..], &x[j + 1..]);
-            x[j] = (x[j] - below) / column[0];
+        // Those of columns side by side wait for each other only in what they have in common.
+        for start in (0..*n).step_by(WIDTH).rev() {
+            let end = (start + WIDTH).min(*n);
+            for r in 0..R {
+                let x = &mut *all[r];
+                let mut below = [0.0; WIDTH];
+                for (j, below) in (start..end).zip(&mut below) {
+                    let column = &l[j * rows..(j + 1) * rows];
+                    *below = sum_of_columns(simd, &column[start + WIDTH..], &x[start + WIDTH..]);
+                }
+                for j in (start..end).rev() {
+                    let column = &l[j * rows..(j + 1) * rows];
+                    let mut rest = x[j] - below[j - start];
+                    for i in j + 1..end {
+                        rest -= column[i] * x[i];
+                    }
+                    x[j] = rest / column[j];
+                }
+            }
         }
     }
+}
+
+/// Σ a b of a multiple of [`WIDTH`], in so many parts.
+#[inline(always)]
+fn sum_of_columns<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
+    let mut parts = [0.0; WIDTH];
+    let every = WIDTH / S::F64_LANES;
+    let (a, b) = (S::as_simd_f64s(a).0, S::as_simd_f64s(b).0);
+    for group in 0..every {
+        let mut sum = simd.splat_f64s(0.0);
+        let mut k = group;
+        while k < a.len().min(b.len()) {
+            sum = simd.add_f64s(sum, simd.mul_f64s(a[k], b[k]));
+            k += every;
+        }
+        S::as_mut_simd_f64s(&mut parts).0[group] = sum;
+    }
+    let [a, b, c, d, e, f, g, h] = parts;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 /// `x −= a c`.
@@ -593,8 +636,12 @@ mod tests {
                 let correlations = Correlations::new(Arch::new(), &at, covariance);
                 let factor = correlations.factor(Arch::new(), 1e-3, &noise).unwrap();
                 let mut x = y.clone();
-                factor.forward(Arch::new(), &mut x);
-                factor.backward(Arch::new(), &mut x);
+                factor.forward(Arch::new(), [&mut x[..]]);
+                let mut narrow = x.clone();
+                narrow.resize(padded(n), 0.0);
+                Backward(&factor, [&mut narrow[..]]).with_simd(pulp::Scalar);
+                factor.backward(Arch::new(), [&mut x]);
+                assert!(x == narrow[..n]);
                 let mut k = Vec::new();
                 for i in 0..n {
                     covariances(Arch::new(), &at, covariance, &at.place(i), &mut k);
