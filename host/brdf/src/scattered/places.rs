@@ -24,6 +24,7 @@ impl Near {
 
 /// All data, and where they count.
 pub(super) struct Places {
+    /// In the order of the tree.
     held: Vec<(Pair, u32)>,
     tree: Tree,
     /// Whether all images of the data are held; else those near to a place are found near the place's own images.
@@ -61,9 +62,10 @@ impl Places {
             .iter()
             .map(|(pair, _)| settings.symmetry.search_place(*pair))
             .collect();
+        let (tree, order) = Tree::new(&at);
         Self {
-            tree: Tree::new(&at),
-            held,
+            tree,
+            held: order.iter().map(|k| held[*k as usize]).collect(),
             holds_images,
         }
     }

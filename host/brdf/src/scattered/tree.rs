@@ -16,10 +16,11 @@ const SEARCHES: u32 = 8;
 /// The corner of a box with the smallest coordinates, and the one with the largest.
 type Bounds = [At; 2];
 
-/// Places of a leaf, axis by axis, and their numbers; beyond the last one no coordinate is a number.
+/// Places of a leaf, axis by axis, and the number of the first, which the others follow; beyond the last one no coordinate
+/// is a number.
 struct Leaf {
     at: [[f32; LEAF]; 6],
-    numbers: [u32; LEAF],
+    first: u32,
 }
 
 /// The tree: each part is halved across its longest side, so often that the halves fit leaves.
@@ -70,8 +71,9 @@ impl Nearest {
 }
 
 impl Tree {
-    /// Of places by their number, below 2²⁹.
-    pub fn new(places: &[At]) -> Self {
+    /// Of fewer than 2²⁹ places, and in which order it numbers them: what is near has near numbers, and what is looked up
+    /// by them is near in memory.
+    pub fn new(places: &[At]) -> (Self, Vec<u32>) {
         let mut all: Vec<(At, u32)> = places.iter().copied().zip(0u32..).collect();
         let depth = all.len().div_ceil(LEAF).next_power_of_two().ilog2();
         let mut tree = Self {
@@ -79,11 +81,12 @@ impl Tree {
             leaves: Vec::with_capacity(1 << depth),
             arch: Arch::new(),
         };
-        tree.split(&mut all, 0, depth);
-        tree
+        tree.split(&mut all, 0, 0, depth);
+        (tree, all.into_iter().map(|(_, number)| number).collect())
     }
 
-    fn split(&mut self, places: &mut [(At, u32)], part: usize, depth: u32) {
+    /// Splits places, of which the first has a number, into a part of the tree.
+    fn split(&mut self, places: &mut [(At, u32)], first: u32, part: usize, depth: u32) {
         let [mut low, mut high] = self.bounds[part];
         for (at, _) in places.iter() {
             for axis in 0..6 {
@@ -95,10 +98,9 @@ impl Tree {
         if depth == 0 {
             let mut leaf = Leaf {
                 at: [[f32::NAN; LEAF]; 6],
-                numbers: [0; LEAF],
+                first,
             };
-            for (k, (at, number)) in places.iter().enumerate() {
-                leaf.numbers[k] = *number;
+            for (k, (at, _)) in places.iter().enumerate() {
                 for axis in 0..6 {
                     leaf.at[axis][k] = at[axis];
                 }
@@ -114,9 +116,9 @@ impl Tree {
             let order = |a: &(At, u32), b: &(At, u32)| a.0[axis].total_cmp(&b.0[axis]);
             places.select_nth_unstable_by(half, order);
         }
-        let (first, second) = places.split_at_mut(half);
-        self.split(first, 2 * part + 1, depth - 1);
-        self.split(second, 2 * part + 2, depth - 1);
+        let (before, after) = places.split_at_mut(half);
+        self.split(before, first, 2 * part + 1, depth - 1);
+        self.split(after, first + half as u32, 2 * part + 2, depth - 1);
     }
 
     /// Adds to what is nearest, as what a search with this number (0 ..= 7) finds around a place.
@@ -186,8 +188,8 @@ impl WithSimd for Searched<'_> {
                 }
                 let wide = [wide];
                 let squares: &[f32] = cast_slice(&wide);
-                let numbers = &leaf.numbers[group * S::F32_LANES..];
-                for (square, number) in squares.iter().zip(numbers) {
+                let first = leaf.first + (group * S::F32_LANES) as u32;
+                for (square, number) in squares.iter().zip(first..) {
                     if *square <= nearest.within {
                         let number = u64::from(number * SEARCHES + self.search);
                         let found = u64::from(square.to_bits()) << 32 | number;
@@ -229,7 +231,8 @@ mod tests {
             // Every place is there twice.
             let half: Vec<At> = (0..count).map(|_| at()).collect();
             let places = [&half[..], &half[..]].concat();
-            let tree = Tree::new(&places);
+            let (tree, order) = Tree::new(&places);
+            let places: Vec<At> = order.iter().map(|k| places[*k as usize]).collect();
             let queries = [at(), at()];
             for many in [1, 8, 200] {
                 let mut nearest = Nearest::new(many);
