@@ -13,6 +13,7 @@ mod imports;
 mod length;
 mod links;
 mod load;
+mod long;
 mod modules;
 mod python;
 mod readers;
@@ -29,6 +30,7 @@ use std::process::ExitCode;
 
 const USAGE: &str = "\
 cargo xtask test     set up what the tests need, then all that a change must pass
+cargo xtask long     the tests that take minutes: with the above, what a release must pass
 cargo xtask doors    which crate may use which, which file imports which, how long functions are
 cargo xtask boards   build the firmware of every board
 cargo xtask images   the boards' firmware as files to flash (ELF, HEX, DFU, plain bytes), in target/images
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
     let rest: Vec<String> = arguments.collect();
     let outcome = match command.as_str() {
         "test" => steps::test(),
+        "long" => long::long(),
         "doors" => steps::doors(),
         "boards" => boards::build(),
         "images" => images::images(),

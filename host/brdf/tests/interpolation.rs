@@ -9,8 +9,8 @@ use gonia_brdf::interpolate::hierarchy::Hierarchy;
 use gonia_brdf::interpolate::patches::{Patch, cover};
 use gonia_brdf::interpolate::refine::Refiner;
 use gonia_brdf::interpolate::{
-    Calibration, Coordinates, Data, FillSettings, Kernel, Origin, Preset, fill, fill_with_errors,
-    origins, select,
+    Calibration, Candidate, Coordinates, Data, FillSettings, Kernel, Origin, Preset, fill,
+    fill_with_errors, origins, select,
 };
 use gonia_brdf::model::{Brdf, Ggx, Kurt, KurtLobe, Ward};
 use gonia_brdf::progress::silent;
@@ -306,7 +306,34 @@ fn samples_without_frames_are_grouped_by_clusters() {
         .filter(|p| p.residual[1].unwrap().abs() < 0.1)
         .count();
     assert!(10 * near > 8 * predictions.len(), "{near}");
-    assert_eq!(select(&data, FillSettings::DEFAULT).candidates.len(), 4);
+    assert_eq!(select(&data, FillSettings::DEFAULT).candidates.len(), 5);
+}
+
+/// A dull base, and a lobe of 12° around the light's own direction.
+struct RetroReflector;
+
+impl Brdf for RetroReflector {
+    fn eval(&self, light: Vec3, view: Vec3) -> [f64; 3] {
+        let apart: f64 = (0..3).map(|k| (light[k] - view[k]).powi(2)).sum();
+        let width = 12f64.to_radians();
+        [0.1 + (-0.5 * apart / (width * width)).exponential(); 3]
+    }
+}
+
+#[test]
+fn of_a_retro_reflector_the_kernel_looks_at_the_difference() {
+    let bins = Bins::new(Grid::with_step_deg(4.0).unwrap(), &measure(&RetroReflector));
+    let data = Data::new(&bins);
+    let selection = select(&data, FillSettings::DEFAULT);
+    assert!(selection.settings.kernel_weight > 1.0);
+    // Nearer than with a kernel that looks at half vector and difference alike.
+    let error_at_most = |weight: f64| {
+        let of = |c: &&Candidate| c.settings.kernel_weight <= weight;
+        let errors = selection.candidates.iter().filter(of);
+        errors.map(|c| c.log_error).fold(f64::INFINITY, f64::min)
+    };
+    let (best, alike) = (error_at_most(f64::INFINITY), error_at_most(1.0));
+    assert!(best < 0.75 * alike, "{best} {alike}");
 }
 
 #[test]

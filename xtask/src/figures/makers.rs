@@ -71,7 +71,7 @@ pub const FIGURES: &[Figure] = &[
         run("cargo bench -p gonia-brdf --bench fill -- matte fabric sharp sharper best"),
     ]),
     figure("materials", 5.0, Tables, &[run(
-        "cargo bench -p gonia-brdf --bench fill -- matte broad fabric sharp sharper round ggx ward brushed-metal satin-paint silk satin",
+        "cargo bench -p gonia-brdf --bench fill -- matte broad fabric sharp sharper round ggx ward brushed-metal satin-paint linen silk satin shot-silk retro plastic velvet twill",
     )]),
     figure("noise", 1.0, Tables, &[run(
         "cargo bench -p gonia-brdf --bench fill -- matte fabric sharp --noise 0.2",
@@ -210,6 +210,7 @@ pub const FIGURES: &[Figure] = &[
         run("cargo bench -p gonia-brdf --bench channels -- fabric preview"),
         run("cargo bench -p gonia-brdf --bench channels -- fabric fast"),
         run("cargo bench -p gonia-brdf --bench channels -- fabric default"),
+        run("cargo bench -p gonia-brdf --bench channels -- fabric best"),
     ]),
     figure("target-error", 1.0, Tables, &[
         run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0"),

@@ -1,5 +1,7 @@
 //! What the benches measure: analytic materials, seen by the paper's plan on the paper's rig.
 
+mod made_up;
+
 use gonia_brdf::Elementary;
 use gonia_brdf::direction::local_direction;
 use gonia_brdf::hemisphere::{directions, paper_lights, paper_views};
@@ -17,10 +19,10 @@ pub const MATERIALS: [&str; 8] = [
     "matte", "broad", "fabric", "sharp", "sharper", "round", "ggx", "ward",
 ];
 
-/// The materials that arguments name, these and those of `gonia demo`; without one, those above.
+/// The materials that arguments name, these, those of `gonia demo` and made-up ones; without one, those above.
 #[allow(dead_code)]
 pub fn named(arguments: &[String]) -> Vec<&'static str> {
-    let others = Material::NAMES.into_iter();
+    let others = Material::NAMES.into_iter().chain(made_up::NAMES);
     let all = MATERIALS
         .into_iter()
         .chain(others.filter(|name| !MATERIALS.contains(name)));
@@ -60,6 +62,9 @@ pub fn material(name: &str) -> Arc<dyn Brdf> {
             alpha_y: 0.3,
             azimuth_deg: 12.0,
         });
+    }
+    if let Some(made_up) = made_up::named(name) {
+        return made_up;
     }
     Arc::new(match name {
         "matte" => Kurt::white_reference_fabric(),

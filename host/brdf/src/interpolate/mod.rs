@@ -56,6 +56,8 @@ pub struct FillSettings {
     /// Size of a block's neighbourhood: so many data; three quarters of them in a coarse block that may be
     /// refined.
     pub neighbours: usize,
+    /// The most data that [`select()`] may take instead, where twice as many predict so much better that it pays.
+    pub neighbours_most: usize,
     /// Of many bins, one in so many is used: for [`Data::thinned`].
     pub one_bin_in: usize,
     /// Where neighbours are looked for.
@@ -115,6 +117,12 @@ impl Preset {
             target_error: TARGET_ERROR,
             budget,
             neighbours,
+            // A preview is what is quick.
+            neighbours_most: if one_bin_in > 1 {
+                neighbours
+            } else {
+                2 * neighbours
+            },
             one_bin_in,
             coordinates: data::SORTED_IN,
             kernel: &Matern32,

@@ -42,12 +42,13 @@ struct Text {
 }
 
 /// The settings' names in the file.
-const NAMES: [&str; 12] = [
+const NAMES: [&str; 13] = [
     "block_deg",
     "tolerance",
     "target_error",
     "budget",
     "neighbours",
+    "neighbours_most",
     "one_bin_in",
     "exponent",
     "weight",
@@ -70,6 +71,7 @@ impl FillPlan {
             s.target_error.to_string(),
             s.budget.to_string(),
             s.neighbours.to_string(),
+            s.neighbours_most.to_string(),
             s.one_bin_in.to_string(),
             s.coordinates.exponent.to_string(),
             s.coordinates.weight.to_string(),
@@ -149,6 +151,7 @@ fn settings_of(text: &BTreeMap<String, String>) -> Option<FillSettings> {
         target_error: number(text, "target_error")?,
         budget: number(text, "budget")?,
         neighbours: number(text, "neighbours")?,
+        neighbours_most: number(text, "neighbours_most")?,
         one_bin_in: number(text, "one_bin_in")?,
         coordinates: Coordinates {
             exponent: number(text, "exponent")?,

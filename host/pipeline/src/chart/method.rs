@@ -226,6 +226,7 @@ impl fmt::Display for Method {
                 let FillSettings {
                     block_deg,
                     neighbours: nodes,
+                    neighbours_most: most,
                     tolerance,
                     budget,
                     one_bin_in,
@@ -238,6 +239,9 @@ impl fmt::Display for Method {
                 if *one_bin_in > 1 {
                     write!(f, ",one-bin-in={one_bin_in}")?;
                 }
+                if most > nodes {
+                    write!(f, ",nodes-at-most={most}")?;
+                }
                 Ok(())
             }
         }
@@ -247,21 +251,28 @@ impl fmt::Display for Method {
 impl FromStr for Method {
     type Err = UnknownBaseline;
 
-    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B` and `,one-bin-in=N`, or the name of a method that works cell by cell.
+    /// `blocks=DEGREES,nodes=N,tolerance=T`, with or without `,budget=B`, `,one-bin-in=N` and
+    /// `,nodes-at-most=N`, or the name of a method that works cell by cell.
     fn from_str(text: &str) -> Result<Self, UnknownBaseline> {
         let blocks = || {
             let (block, rest) = text.strip_prefix("blocks=")?.split_once(",nodes=")?;
             let (nodes, rest) = rest.split_once(",tolerance=")?;
+            let (rest, most) = rest.split_once(",nodes-at-most=").unwrap_or((rest, ""));
             let (rest, one_bin_in) = rest.split_once(",one-bin-in=").unwrap_or((rest, "1"));
             let (tolerance, budget) = rest.split_once(",budget=").unwrap_or((rest, "inf"));
             let block_deg = block.parse().ok().filter(|d| (1.0..=45.0).contains(d))?;
             let nodes = nodes.parse().ok().filter(|n| (8..=1024).contains(n))?;
+            let most = match most {
+                "" => nodes,
+                most => most.parse().ok().filter(|n| (nodes..=1024).contains(n))?,
+            };
             let tolerance = tolerance.parse().ok().filter(|t: &f32| *t >= 0.0)?;
             let budget = budget.parse().ok().filter(|b: &f32| *b >= 0.0)?;
             let one_bin_in = one_bin_in.parse().ok().filter(|n| (1..=1000).contains(n))?;
             Some(Method::Blocks(FillSettings {
                 block_deg,
                 neighbours: nodes,
+                neighbours_most: most,
                 tolerance,
                 budget,
                 one_bin_in,

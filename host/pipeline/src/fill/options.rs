@@ -114,6 +114,8 @@ impl FillOptions {
                 .block_deg
                 .unwrap_or(preset.block_deg.max(2.0 * self.step_deg)),
             neighbours: self.nodes.unwrap_or(preset.neighbours),
+            // Who asks for so many gets them.
+            neighbours_most: self.nodes.unwrap_or(preset.neighbours_most),
             tolerance: self.tolerance.unwrap_or(preset.tolerance),
             target_error: match (self.target_error, self.tolerance) {
                 (None, Some(_)) => 0.0,

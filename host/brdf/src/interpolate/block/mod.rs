@@ -100,7 +100,9 @@ impl<K: Kernel, const N: usize> Block<N> for KrigingBlock<K, N> {
         process.middle = middle;
         process.drift = settings.drift;
         let range = settings.range.max(self.kernel.range_min());
-        let scale = self.kernel.scale() / (range * radius.max(1e-6));
+        // The longer axes decide how far apart data are at most.
+        let stretch = settings.anisotropy.max(1.0);
+        let scale = self.kernel.scale() / (range * radius.max(1e-6) * stretch);
         let second = scale * settings.anisotropy;
         process.scale = [scale, scale, scale, second, second, second];
         process.load(data, padded);
@@ -431,10 +433,11 @@ mod tests {
             datum
         };
         let place = |by: f32| moved(&datum(0.13, -0.21, 1.0), by).point;
-        let predicted = |by: f32, anisotropy: f32| {
+        let with_range = |by: f32, anisotropy: f32, range: f32| {
             let data: Vec<Datum> = scattered(60).iter().map(|n| moved(n, by)).collect();
             let settings = BlockSettings {
                 anisotropy,
+                range,
                 ..SETTINGS
             };
             let mut block = KrigingBlock::new(&Matern32);
@@ -444,6 +447,7 @@ mod tests {
             let of_mean = block.variance_of_mean(&[place(by)]);
             [at(&block, &place(by))[0], variance[0][0], of_mean[0]]
         };
+        let predicted = |by, anisotropy| with_range(by, anisotropy, SETTINGS.range);
         let (by_settings, by_points, plain) = (
             predicted(2.0, 0.5),
             predicted(1.0, 1.0),
@@ -453,6 +457,13 @@ mod tests {
             let near = (by_settings[k] / by_points[k] - 1.0).abs();
             let far = (plain[k] / by_points[k] - 1.0).abs();
             assert!(near < 1e-3 && far > 3.0 * near, "{k}: {near} {far}");
+        }
+        // Above 1, the range is that of the longer axes: the kernel's polynomial ends soon behind it.
+        let long = with_range(0.125, 8.0, SETTINGS.range);
+        let all_long = with_range(1.0, 1.0, 8.0 * SETTINGS.range);
+        for k in 0..3 {
+            let off = (long[k] / all_long[k] - 1.0).abs();
+            assert!(off < 1e-2, "{k}: {long:?} {all_long:?}");
         }
     }
 
