@@ -4,7 +4,8 @@
 //! peak of memory counts from when the samples are there. A grid that does not fit memory is filled by way of the disk:
 //! `cargo xtask figures fill-fine` measures that. `-- --few` prints the table of few samples alone, at random pairs of
 //! directions: time of a grid of 2°, and error and coverage of the fit at others; materials or numbers of samples after
-//! it leave the other rows out, `seed=9` draws other samples, and `blocks` fills by blocks what is not isotropic.
+//! it leave the other rows out, `seed=9` draws other samples, `blocks` fills by blocks what is not isotropic, and
+//! `values` leaves the error bars out.
 
 #![allow(clippy::expect_used)]
 
@@ -130,18 +131,25 @@ fn few_samples(only: &[String]) {
         counts = FEW.to_vec();
     }
     let by_blocks = only.iter().any(|a| a == "blocks");
+    let values = only.iter().any(|a| a == "values");
     let mut seeds = only.iter().filter_map(|a| a.strip_prefix("seed="));
     let seed: Option<u64> = seeds.next().map(|seed| seed.parse().expect("a number"));
     for name in names {
         let material = material(name);
         for samples in &counts {
             let seed = seed.unwrap_or(*samples as u64);
-            few_row(name, &*material, *samples, seed, by_blocks);
+            few_row(name, &*material, *samples, seed, (by_blocks, values));
         }
     }
 }
 
-fn few_row(name: &str, material: &dyn Brdf, count: usize, seed: u64, by_blocks: bool) {
+fn few_row(
+    name: &str,
+    material: &dyn Brdf,
+    count: usize,
+    seed: u64,
+    (by_blocks, values): (bool, bool),
+) {
     let grid = Grid::with_step_deg(2.0).expect("a grid step");
     let mut random = Random::new(seed);
     let lowest = 80f64.to_radians().cosine();
@@ -171,8 +179,8 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize, seed: u64, by_blocks: 
     let by_blocks = by_blocks && !symmetry.is_isotropic();
     let mut at_nodes = (f64::NAN, f64::NAN);
     let times = [false, true].map(|with_errors| {
-        if by_blocks && with_errors {
-            return "by blocks".to_owned();
+        if with_errors && (by_blocks || values) {
+            return "–".to_owned();
         }
         let dense = if by_blocks {
             let bins = Bins::new(grid, &symmetry.completed(samples.clone()));
@@ -183,7 +191,7 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize, seed: u64, by_blocks: 
         } else {
             fit.dense(grid, with_errors)
         };
-        let time = format!("{:.1}", lap());
+        let time = format!("{:.2}", lap());
         at_nodes = against_truth(&dense, &truth, &asked);
         lap();
         time
@@ -198,7 +206,7 @@ fn few_row(name: &str, material: &dyn Brdf, count: usize, seed: u64, by_blocks: 
     }
     let all = 3.0 * ASKED as f64;
     println!(
-        "| {name} | {count} | {symmetry} | {choosing:.1} | {} | {:.4} | {:.4} | {:.1} % | {} |",
+        "| {name} | {count} | {symmetry} | {choosing:.2} | {} | {:.4} | {:.4} | {:.1} % | {} |",
         times.join(" | "),
         (squares / all).sqrt(),
         at_nodes.0,

@@ -3,9 +3,10 @@
 
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
+use super::narrow::Narrow;
 use super::places::{Near, distance2, exchanged, radius_of};
 use super::planes::{Block, Rows, planes_of, three};
-use super::quadratic::{Cells, Few, Nodes, weights};
+use super::quadratic::{By, Cells, Determined, Few, Stages, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
 use crate::direction::Direction;
@@ -28,6 +29,8 @@ const ONE_SYSTEM: usize = 192;
 const TOLERANCE: f64 = 0.25;
 /// … or than this share of the value.
 const TOLERANCE_MIN: f64 = 1e-3;
+/// So much of the tolerance may be due to single precision.
+const NARROW: f64 = 0.2;
 /// So many cells are not worth a test.
 const DIRECT: usize = 40;
 /// Cells whose reach is beyond so many times what they may share, by the radius around those that they are half of, are
@@ -64,6 +67,8 @@ impl Systems {
 /// Cells that share systems, and what holds for all of them.
 struct Shares<'a> {
     systems: &'a Systems,
+    /// The same in single precision, where that is near enough.
+    narrow: Option<Narrow>,
     pair: &'a Cells,
     cells: Cells,
     /// What logarithms may be off by.
@@ -72,11 +77,20 @@ struct Shares<'a> {
     errors: Vec<Vec<f64>>,
 }
 
+impl Shares<'_> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+        match &self.narrow {
+            Some(narrow) => self.systems.own.logs_of(narrow.sums(place)),
+            None => self.systems.logs_at(place, work),
+        }
+    }
+}
+
 /// Memory of one thread.
 #[derive(Default)]
 struct Memory {
     work: Work,
-    values: Vec<f64>,
+    stages: Stages,
     relative: Vec<f64>,
     /// Values and errors of the pair of patches that is worked on.
     block: Block,
@@ -270,7 +284,7 @@ impl Filler<'_> {
             return;
         }
         if let Some(one) = &self.one {
-            return self.share(one, pair, cells, memory);
+            return self.share(one, pair, (cells, f64::INFINITY), memory);
         }
         let middle = self.place(cells.middle());
         let reach = (0..16)
@@ -289,7 +303,7 @@ impl Filler<'_> {
         if cells.count() > 1 && reach > SHARED * near.radius() {
             halve(near.radius(), memory);
         } else if let Some(systems) = self.systems(&near) {
-            self.share(&systems, pair, cells, memory);
+            self.share(&systems, pair, (cells, reach), memory);
         }
     }
 
@@ -316,8 +330,16 @@ impl Filler<'_> {
         longest.unwrap_or(0)
     }
 
-    fn share(&self, systems: &Systems, pair: &Cells, cells: Cells, memory: &mut Memory) {
-        let middle = systems.at(&self.place(cells.middle()), true, &mut memory.work);
+    /// Fills cells, none of which is farther from their middle than they reach, by systems that they share.
+    fn share(
+        &self,
+        systems: &Systems,
+        pair: &Cells,
+        (cells, reach): (Cells, f64),
+        memory: &mut Memory,
+    ) {
+        let at = self.place(cells.middle());
+        let middle = systems.at(&at, true, &mut memory.work);
         let relative = middle
             .relative
             .iter()
@@ -327,11 +349,15 @@ impl Filler<'_> {
             true => self.errors(systems, &cells, &mut memory.work),
             false => vec![Vec::new(); self.channels],
         };
+        let tolerance = TOLERANCE * self.fit.choice.error_factor * relative;
+        let tolerance = tolerance.max(TOLERANCE_MIN);
+        let narrow = || systems.own.narrow((at, reach), NARROW * tolerance);
         let shares = Shares {
             systems,
+            narrow: systems.reciprocal.is_none().then(narrow).flatten(),
             pair,
             cells,
-            tolerance: (TOLERANCE * self.fit.choice.error_factor * relative).max(TOLERANCE_MIN),
+            tolerance,
             errors,
         };
         self.refine(&shares, cells, memory);
@@ -358,7 +384,8 @@ impl Filler<'_> {
                     logs(self.place(place))
                 })
             });
-            self.few_nodes(cells, (middle, ends), &mut logs)
+            let few = self.few_nodes(cells, (middle, ends), &mut logs);
+            few.iter().map(|few| few.all(self.arch)).collect()
         } else {
             self.all_nodes(cells, &mut logs)
         };
@@ -394,7 +421,7 @@ impl Filler<'_> {
                     let n_phi = self.grid.n_phi();
                     let [l, v] = [*light, *view].map(|d| [d / n_phi, d % n_phi].map(|x| x as f64));
                     let place = self.place([l[0], l[1], v[0], v[1]]);
-                    let logs = shares.systems.logs_at(&place, &mut memory.work);
+                    let logs = shares.logs_at(&place, &mut memory.work);
                     for (values, log) in channels.iter_mut().zip(logs) {
                         values.push(log);
                     }
@@ -408,19 +435,20 @@ impl Filler<'_> {
         let lines = self.lines(shares, &part, &mut memory.work);
         let bends = lines.bends;
         if lines.are_quadratic {
-            let mut nodes = self.nodes(shares, &part, &lines, &mut memory.work);
-            if self.meets_between(shares, &part, &nodes, &mut memory.work) {
-                for values in &mut nodes {
-                    memory.values.clear();
-                    let between = Nodes {
+            let (by, mut channels) = self.nodes(shares, &part, &lines, &mut memory.work);
+            if self.meets_between(shares, &part, (by, &channels), &mut memory.work) {
+                for values in &mut channels {
+                    let of = Determined {
                         cells: &part,
+                        by,
                         values,
                     };
-                    between.between(&part, &mut memory.values);
-                    exponentials(self.arch, &mut memory.values);
-                    std::mem::swap(values, &mut memory.values);
+                    let mut found = Vec::with_capacity(part.count());
+                    of.between(self.arch, &part, &mut memory.stages, &mut found);
+                    exponentials(self.arch, &mut found);
+                    *values = found;
                 }
-                return self.store(shares, part, &nodes, memory);
+                return self.store(shares, part, &channels, memory);
             }
         }
         let sharpest = (0..4).max_by(|a, b| bends[*a].total_cmp(&bends[*b]));
@@ -433,30 +461,32 @@ impl Filler<'_> {
         }
     }
 
-    /// Logarithms at all nodes of a part, channel by channel.
+    /// What determines the logarithms of a part, channel by channel.
     fn nodes(
         &self,
         shares: &Shares<'_>,
         part: &Cells,
         lines: &Lines,
         work: &mut Work,
-    ) -> Vec<Vec<f64>> {
-        let mut logs = |place: Pair| shares.systems.logs_at(&place, work);
+    ) -> (By, Vec<Vec<f64>>) {
+        let mut logs = |place: Pair| shares.logs_at(&place, work);
         if (0..4).all(|axis| part.length(axis) > 2) {
-            self.few_nodes(part, (lines.middle, lines.ends), &mut logs)
+            let few = self.few_nodes(part, (lines.middle, lines.ends), &mut logs);
+            let powers = few.iter().map(|few| few.powers().to_vec());
+            (By::Powers, powers.collect())
         } else {
-            self.all_nodes(part, &mut logs)
+            (By::Nodes, self.all_nodes(part, &mut logs))
         }
     }
 
-    /// Values at all nodes of cells of more than two along each axis, by those in the middle, at the ends of the lines
-    /// through it, and at the corners.
+    /// Of cells of more than two along each axis, values in the middle, at the ends of the lines through it, and at the
+    /// corners, channel by channel.
     fn few_nodes(
         &self,
         cells: &Cells,
         (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
         at: &mut impl FnMut(Pair) -> [f64; 3],
-    ) -> Vec<Vec<f64>> {
+    ) -> Vec<Few> {
         let corners: [[f64; 3]; 16] =
             std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
         let few = |c: usize| Few {
@@ -464,7 +494,7 @@ impl Filler<'_> {
             ends: ends.map(|ends| ends.map(|end| end[c])),
             corners: corners.map(|corner| corner[c]),
         };
-        (0..self.channels).map(|c| few(c).all()).collect()
+        (0..self.channels).map(few).collect()
     }
 
     /// Values at all nodes of cells, each computed.
@@ -479,7 +509,7 @@ impl Filler<'_> {
     }
 
     fn lines(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> Lines {
-        let mut logs = |at: [f64; 4]| shares.systems.logs_at(&self.place(at), work);
+        let mut logs = |at: [f64; 4]| shares.logs_at(&self.place(at), work);
         let at = part.middle();
         let middle = logs(at);
         let mut ends = [[middle; 2]; 4];
@@ -522,31 +552,27 @@ impl Filler<'_> {
         &self,
         shares: &Shares<'_>,
         part: &Cells,
-        nodes: &[Vec<f64>],
+        (by, channels): (By, &[Vec<f64>]),
         work: &mut Work,
     ) -> bool {
         // Half of the corners of a box of half the size.
         let asides = (0..16usize).filter(|bits| bits.count_ones() % 2 == 0);
         asides.into_iter().all(|bits| {
-            let mut aside = *part;
-            for axis in 0..4 {
+            let cell = [0, 1, 2, 3].map(|axis| {
                 let quarter = part.length(axis) / 4;
-                aside.start[axis] = match bits >> axis & 1 {
+                match bits >> axis & 1 {
                     0 => part.start[axis] + quarter,
                     _ => part.end[axis] - 1 - quarter,
-                };
-                aside.end[axis] = aside.start[axis] + 1;
-            }
-            let found = shares.systems.logs_at(&self.place(aside.middle()), work);
-            nodes.iter().zip(found).all(|(values, found)| {
-                let mut between = Vec::with_capacity(1);
-                let nodes = Nodes {
+                }
+            });
+            let found = shares.logs_at(&self.place(cell.map(|x| x as f64)), work);
+            channels.iter().zip(found).all(|(values, found)| {
+                let of = Determined {
                     cells: part,
+                    by,
                     values,
                 };
-                nodes.between(&aside, &mut between);
-                let off = |between: &f64| (between - found).abs();
-                between.iter().all(|b| off(b) <= shares.tolerance)
+                (of.at(cell) - found).abs() <= shares.tolerance
             })
         })
     }
@@ -557,12 +583,13 @@ impl Filler<'_> {
             if !self.with_errors {
                 continue;
             }
-            memory.relative.clear();
-            let between = Nodes {
+            let of = Determined {
                 cells: &shares.cells,
+                by: By::Nodes,
                 values: &shares.errors[c],
             };
-            between.between(&part, &mut memory.relative);
+            let (stages, relative) = (&mut memory.stages, &mut memory.relative);
+            of.between(self.arch, &part, stages, relative);
             exponentials(self.arch, &mut memory.relative);
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;

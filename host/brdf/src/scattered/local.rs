@@ -1,6 +1,7 @@
 //! A kriging system through the data around a place, in double precision.
 
 use super::data::Datum;
+use super::narrow::Narrow;
 use super::nugget::{largest_nugget, likely_nugget};
 use super::places::Near;
 use super::wide::{Axes, Correlations, Covariance, Factor, Noise, covariances, dot};
@@ -36,6 +37,13 @@ struct Channel {
     /// Variance of the process, by maximum likelihood.
     signal: f64,
     limits: (f64, f64),
+}
+
+impl Channel {
+    /// What is kriged, from the sum of covariances by their weights.
+    fn within(&self, sum: f64) -> f64 {
+        (self.mean + sum).clamp(self.limits.0, self.limits.1)
+    }
 }
 
 /// Memory for the covariances of a place.
@@ -135,52 +143,64 @@ impl Local {
                 None => nugget = 10.0 * nugget.max(1e-12),
             }
         };
-        let mut ones = vec![1.0; near.len()];
-        factor.forward(arch, &mut ones);
-        let ones2 = dot(arch, &ones, &ones);
         let mut local = Self {
             arch,
             response,
             at,
             covariance,
             factor,
-            ones,
-            ones2,
+            ones: vec![1.0; near.len()],
+            ones2: 0.0,
             channels: Vec::new(),
             nugget,
             shares: noise.variances.iter().sum::<f64>() / near.len() as f64,
             hidden: settings.hidden,
         };
-        let is_grey = all[0] == all[1] && all[1] == all[2];
-        local.channels = all[..if is_grey { 1 } else { 3 }]
-            .iter()
-            .map(|values| local.channel(values))
-            .collect();
+        if all[0] == all[1] && all[1] == all[2] {
+            let [first, ..] = all;
+            local.solve([first]);
+        } else {
+            local.solve(all);
+        }
         Some(local)
     }
 
-    fn channel(&self, values: &[f64]) -> Channel {
-        let n = values.len();
-        let mut y = values.to_vec();
-        self.factor.forward(self.arch, &mut y);
-        let mean = dot(self.arch, &y, &self.ones) / self.ones2;
-        for (y, one) in y.iter_mut().zip(&self.ones) {
-            *y -= mean * one;
+    /// Solves for channels of so many values.
+    fn solve<const N: usize>(&mut self, all: [Vec<f64>; N]) {
+        let (arch, factor) = (self.arch, &self.factor);
+        factor.forward(arch, [&mut self.ones[..]]);
+        self.ones2 = dot(arch, &self.ones, &self.ones);
+        let mut solved = all.clone();
+        factor.forward(arch, solved.each_mut().map(|y| &mut y[..]));
+        let (mut means, mut squares) = ([0.0; N], [0.0; N]);
+        for c in 0..N {
+            means[c] = dot(arch, &solved[c], &self.ones) / self.ones2;
+            for (y, one) in solved[c].iter_mut().zip(&self.ones) {
+                *y -= means[c] * one;
+            }
+            squares[c] = dot(arch, &solved[c], &solved[c]);
         }
-        let squares = dot(self.arch, &y, &y);
-        self.factor.backward(self.arch, &mut y);
+        factor.backward(arch, solved.each_mut());
+        let channels = solved.into_iter().zip(&all).enumerate();
+        self.channels = channels
+            .map(|(c, (weights, values))| Channel {
+                weights,
+                mean: means[c],
+                signal: squares[c] / (values.len().max(2) - 1) as f64,
+                limits: self.limits(values),
+            })
+            .collect();
+    }
+
+    /// What a value near these lies between.
+    fn limits(&self, values: &[f64]) -> (f64, f64) {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let beyond = match self.response {
             Response::Logarithm => (BEYOND_SHARE * (high - low)).clamp(BEYOND.0, BEYOND.1),
             Response::Linear => 0.0,
         };
-        Channel {
-            weights: y,
-            mean,
-            signal: squares / (n.max(2) - 1) as f64,
-            limits: (low - beyond, high + beyond),
-        }
+        (low - beyond, high + beyond)
     }
 
     /// Logarithm of how likely the data are, the variance of the process being what makes them most likely; mean over
@@ -211,10 +231,29 @@ impl Local {
         logs
     }
 
+    /// [`Self::logs_at`] in single precision for places within a distance from a middle; `None` where they may be off by
+    /// more than this.
+    pub fn narrow(&self, around: (Pair, f64), off: f64) -> Option<Narrow> {
+        if self.response == Response::Linear {
+            return None;
+        }
+        let places = (0..self.at.len()).map(|k| self.at.place(k));
+        let weights = self.channels.iter().map(|c| &c.weights[..]);
+        Narrow::new(self.arch, self.covariance, places, weights, around, off)
+    }
+
+    /// [`Self::logs_at`] of the sums of covariances by their weights.
+    pub fn logs_of(&self, sums: [f64; 3]) -> [f64; 3] {
+        let mut logs = sums;
+        for (log, channel) in logs.iter_mut().zip(&self.channels) {
+            *log = channel.within(*log) + self.below(channel);
+        }
+        logs
+    }
+
     /// What is kriged, at the place with these covariances.
     fn fitted(&self, channel: &Channel, covariances: &[f64]) -> f64 {
-        let fitted = channel.mean + dot(self.arch, covariances, &channel.weights);
-        fitted.clamp(channel.limits.0, channel.limits.1)
+        channel.within(dot(self.arch, covariances, &channel.weights))
     }
 
     /// Noise that is as much above as below lies lower in logarithms, by half its variance.
@@ -269,7 +308,7 @@ impl Local {
     /// Kriging variance over that of the process, of the covariances `k` of a place with the data, which are
     /// spoilt.
     fn unit_variance(&self, k: &mut [f64]) -> f64 {
-        self.factor.forward(self.arch, k);
+        self.factor.forward(self.arch, [&mut *k]);
         let squares = dot(self.arch, k, k);
         let along = dot(self.arch, k, &self.ones);
         (1.0 - squares + (1.0 - along).powi(2) / self.ones2).max(1e-12)

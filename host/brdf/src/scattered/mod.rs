@@ -12,6 +12,7 @@ mod left_out;
 mod local;
 mod merge;
 mod mirror;
+mod narrow;
 mod nugget;
 mod places;
 mod planes;
@@ -19,6 +20,7 @@ mod quadratic;
 mod residual;
 mod searches;
 mod table;
+mod tree;
 mod trial;
 mod tune;
 mod wide;
@@ -188,10 +190,14 @@ const WITHIN_NOISE: f64 = 4.0;
 impl Response {
     fn of(here: &[&Datum]) -> Self {
         let within_noise = (0..3).any(|c| {
-            let mut values: Vec<f64> = here.iter().map(|d| d.value[c]).collect();
-            values.sort_by(f64::total_cmp);
-            let lowest = values.first().copied().unwrap_or(0.0);
-            lowest < 0.0 && values[values.len() / 2] < -WITHIN_NOISE * lowest
+            let values = here.iter().map(|d| d.value[c]);
+            let lowest = values.clone().fold(f64::INFINITY, f64::min);
+            // Without a negative one nothing needs sorting.
+            lowest < 0.0 && {
+                let mut values: Vec<f64> = values.collect();
+                values.sort_by(f64::total_cmp);
+                values[values.len() / 2] < -WITHIN_NOISE * lowest
+            }
         });
         if within_noise {
             Response::Linear

@@ -2,11 +2,10 @@
 
 use super::Settings;
 use super::data::Datum;
+use super::tree::{At, Nearest, Tree};
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
 use crate::interpolate::coordinates::Pair;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use std::num::NonZero;
 
 /// A datum near a place: turned, where the symmetry allows it, so that it lies nearest to it.
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +24,9 @@ impl Near {
 
 /// All data, and where they count.
 pub(super) struct Places {
+    /// In the order of the tree.
     held: Vec<(Pair, u32)>,
-    tree: Option<ImmutableKdTree<f32, 6>>,
+    tree: Tree,
     /// Whether all images of the data are held; else those near to a place are found near the place's own images.
     holds_images: bool,
 }
@@ -58,13 +58,14 @@ impl Places {
     }
 
     fn holding(held: Vec<(Pair, u32)>, settings: &Settings, holds_images: bool) -> Self {
-        let at: Vec<[f32; 6]> = held
+        let at: Vec<At> = held
             .iter()
             .map(|(pair, _)| settings.symmetry.search_place(*pair))
             .collect();
+        let (tree, order) = Tree::new(&at);
         Self {
-            tree: ImmutableKdTree::new_from_slice(&at).ok(),
-            held,
+            tree,
+            held: order.iter().map(|k| held[*k as usize]).collect(),
             holds_images,
         }
     }
@@ -90,7 +91,6 @@ impl Places {
         loop {
             let mut near: Vec<Near> = self
                 .nearest(place, wanted, settings)
-                .into_iter()
                 .filter(|(_, datum)| keep(*datum))
                 .map(|(pair, datum)| {
                     let pair = settings.symmetry.aligned(pair, place);
@@ -101,11 +101,7 @@ impl Places {
                     }
                 })
                 .collect();
-            // Equal distances come in the order of the data, whatever the tree.
-            near.sort_by(|a, b| {
-                let order = a.distance2.total_cmp(&b.distance2);
-                order.then_with(|| a.datum.cmp(&b.datum))
-            });
+            in_order(&mut near);
             near.dedup_by(|b, a| a.datum == b.datum && distance2(&a.pair, &b.pair) < SAME2);
             let all = match self.holds_images {
                 true => self.held.len(),
@@ -120,35 +116,38 @@ impl Places {
     }
 
     /// So many images, or all, nearest as the search sees it.
-    fn nearest(&self, place: Pair, wanted: usize, settings: &Settings) -> Vec<(Pair, u32)> {
-        let many = NonZero::new(wanted.min(self.held.len()));
-        let (Some(tree), Some(many)) = (&self.tree, many) else {
-            return Vec::new();
-        };
+    fn nearest(
+        &self,
+        place: Pair,
+        wanted: usize,
+        settings: &Settings,
+    ) -> impl Iterator<Item = (Pair, u32)> {
         let searches = match self.holds_images {
             true => 1,
             false => image_count(settings),
         };
         // Each image is its own inverse: a datum's is as far from the place as the datum from the place's.
-        let mut found: Vec<(f32, usize, u32)> = Vec::new();
+        let mut nearest = Nearest::new(wanted.min(searches * self.held.len()));
         for k in 0..searches {
             let query = settings.symmetry.search_place(image(place, k, settings));
-            let search = tree.query(&query);
-            let search = search.nearest_n::<SquaredEuclidean<f32>>(many);
-            let nearer = match found.get(wanted - 1) {
-                Some((farthest, _, _)) => search.within(*farthest).execute(),
-                None => search.execute(),
-            };
-            found.extend(nearer.into_iter().map(|f| (f.distance, k, f.item)));
-            found.sort_by(|a, b| a.0.total_cmp(&b.0));
-            found.truncate(wanted);
+            self.tree.search(query, k as u32, &mut nearest);
         }
-        let images = found.into_iter().map(|(_, k, item)| {
+        nearest.found().map(|(item, k)| {
             let (pair, datum) = self.held[item as usize];
-            (image(pair, k, settings), datum)
-        });
-        images.collect()
+            (image(pair, k as usize, settings), datum)
+        })
     }
+}
+
+/// Sorts by distance: equal ones come in the order of the data, whatever the tree.
+fn in_order(near: &mut Vec<Near>) {
+    // Distances are not negative: their bits are in their order. The places themselves are moved once.
+    let mut order: Vec<(u64, u32, u32)> = (0u32..)
+        .zip(near.iter())
+        .map(|(k, near)| (near.distance2.to_bits(), near.datum, k))
+        .collect();
+    order.sort_unstable();
+    *near = order.iter().map(|(_, _, k)| near[*k as usize]).collect();
 }
 
 /// How many images count as a datum, itself among them, turns by any angle aside.

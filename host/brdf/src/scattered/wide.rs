@@ -6,7 +6,8 @@
 use super::ScatteredKernel;
 use crate::elementary::Elementary;
 use crate::interpolate::coordinates::Pair;
-use pulp::{Arch, Simd, WithSimd};
+use pulp::bytemuck::cast_slice_mut;
+use pulp::{Arch, Scalar, Simd, WithSimd};
 
 /// Parts of a sum.
 const LANES: usize = 16;
@@ -50,7 +51,7 @@ impl Axes {
     }
 
     #[inline(always)]
-    fn place(&self, k: usize) -> Pair {
+    pub fn place(&self, k: usize) -> Pair {
         let rows = padded(self.n);
         let at = |axis: usize| self.all[axis * rows + k];
         [at(0), at(1), at(2), at(3), at(4), at(5)]
@@ -58,11 +59,9 @@ impl Axes {
 
     /// Those of an axis from number `from` on, many at a time.
     #[inline(always)]
-    fn axis(&self, axis: usize, from: usize) -> &[[f64; WIDTH]] {
+    fn axis(&self, axis: usize, from: usize) -> &[f64] {
         let rows = padded(self.n);
-        self.all[axis * rows + from..(axis + 1) * rows]
-            .as_chunks()
-            .0
+        &self.all[axis * rows + from..(axis + 1) * rows]
     }
 }
 
@@ -151,14 +150,20 @@ impl Factor {
         2.0 * pivots.sum::<f64>()
     }
 
-    /// `x = L⁻¹ x`.
-    pub fn forward(&self, arch: Arch, x: &mut [f64]) {
+    /// `x = L⁻¹ x` of each.
+    pub fn forward<const R: usize>(&self, arch: Arch, x: [&mut [f64]; R]) {
         arch.dispatch(Forward(self, x));
     }
 
-    /// `x = L⁻ᵀ x`.
-    pub fn backward(&self, arch: Arch, x: &mut [f64]) {
-        arch.dispatch(Backward(self, x));
+    /// `x = L⁻ᵀ x` of each.
+    pub fn backward<const R: usize>(&self, arch: Arch, mut x: [&mut Vec<f64>; R]) {
+        for x in &mut x {
+            x.resize(padded(self.n), 0.0);
+        }
+        arch.dispatch(Backward(self, x.each_mut().map(|x| &mut x[..])));
+        for x in &mut x {
+            x.truncate(self.n);
+        }
     }
 }
 
@@ -196,9 +201,13 @@ impl WithSimd for Exponentials<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for x in self.0.iter_mut() {
-            *x = exponential(*x);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (wide, rest) = S::as_mut_simd_f64s(self.0);
+        for x in wide {
+            *x = exponential(simd, *x);
+        }
+        for x in rest {
+            *x = exponential(Scalar, *x);
         }
     }
 }
@@ -214,8 +223,8 @@ impl WithSimd for Covariances<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        fill_column(self.at, 0, self.covariance, self.place, self.k);
+    fn with_simd<S: Simd>(self, simd: S) {
+        fill_column(simd, self.at, 0, self.covariance, self.place, self.k);
     }
 }
 
@@ -240,13 +249,20 @@ impl WithSimd for Filled<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let n = self.at.len();
         let rows = padded(n);
         for j in 0..n {
             let from = j / WIDTH * WIDTH;
             let column = &mut self.k[j * rows + from..(j + 1) * rows];
-            fill_column(self.at, from, self.covariance, &self.at.place(j), column);
+            fill_column(
+                simd,
+                self.at,
+                from,
+                self.covariance,
+                &self.at.place(j),
+                column,
+            );
         }
     }
 }
@@ -387,40 +403,77 @@ fn factor_panel<S: Simd>(simd: S, panel: &mut [f64], j: usize, rows: usize) -> b
     true
 }
 
-struct Forward<'a>(&'a Factor, &'a mut [f64]);
+struct Forward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
 
-impl WithSimd for Forward<'_> {
+impl<const R: usize> WithSimd for Forward<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self(Factor { n, l }, x) = self;
+        let Self(Factor { n, l }, all) = self;
         let rows = padded(*n);
         for (j, column) in l.chunks_exact(rows).enumerate() {
-            let first = x[j] / column[j];
             // What is above the diagonal is zero.
             let from = j / WIDTH * WIDTH;
-            subtract(simd, &mut x[from..], &column[from..*n], first);
-            x[j] = first;
+            for r in 0..R {
+                let x = &mut *all[r];
+                let first = x[j] / column[j];
+                subtract(simd, &mut x[from..], &column[from..*n], first);
+                x[j] = first;
+            }
         }
     }
 }
 
-struct Backward<'a>(&'a Factor, &'a mut [f64]);
+struct Backward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
 
-impl WithSimd for Backward<'_> {
+impl<const R: usize> WithSimd for Backward<'_, R> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self(Factor { n, l }, x) = self;
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self(Factor { n, l }, all) = self;
         let rows = padded(*n);
-        for j in (0..*n).rev() {
-            let column = &l[j * rows + j..j * rows + n];
-            let below = sum_of_products(&column[1..], &x[j + 1..]);
-            x[j] = (x[j] - below) / column[0];
+        // Those of columns side by side wait for each other only in what they have in common.
+        for start in (0..*n).step_by(WIDTH).rev() {
+            let end = (start + WIDTH).min(*n);
+            for r in 0..R {
+                let x = &mut *all[r];
+                let mut below = [0.0; WIDTH];
+                for (j, below) in (start..end).zip(&mut below) {
+                    let column = &l[j * rows..(j + 1) * rows];
+                    *below = sum_of_columns(simd, &column[start + WIDTH..], &x[start + WIDTH..]);
+                }
+                for j in (start..end).rev() {
+                    let column = &l[j * rows..(j + 1) * rows];
+                    let mut rest = x[j] - below[j - start];
+                    for i in j + 1..end {
+                        rest -= column[i] * x[i];
+                    }
+                    x[j] = rest / column[j];
+                }
+            }
         }
     }
+}
+
+/// Σ a b of a multiple of [`WIDTH`], in so many parts.
+#[inline(always)]
+fn sum_of_columns<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
+    let mut parts = [0.0; WIDTH];
+    let every = WIDTH / S::F64_LANES;
+    let (a, b) = (S::as_simd_f64s(a).0, S::as_simd_f64s(b).0);
+    for group in 0..every {
+        let mut sum = simd.splat_f64s(0.0);
+        let mut k = group;
+        while k < a.len().min(b.len()) {
+            sum = simd.add_f64s(sum, simd.mul_f64s(a[k], b[k]));
+            k += every;
+        }
+        S::as_mut_simd_f64s(&mut parts).0[group] = sum;
+    }
+    let [a, b, c, d, e, f, g, h] = parts;
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 /// `x −= a c`.
@@ -463,30 +516,35 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
 
 /// The covariances of a place with those from number `from` on, a multiple of [`WIDTH`] of them.
 #[inline(always)]
-fn fill_column(at: &Axes, from: usize, covariance: Covariance, place: &Pair, column: &mut [f64]) {
-    let scale = covariance.scale;
-    let planar = at.axis(0, from).iter().zip(at.axis(1, from));
-    let upright = at.axis(2, from).iter().zip(at.axis(3, from));
-    let others = at.axis(4, from).iter().zip(at.axis(5, from));
-    let (columns, _) = column.as_chunks_mut::<WIDTH>();
-    for (((out, (x, y)), (z, u)), (v, w)) in columns.iter_mut().zip(planar).zip(upright).zip(others)
-    {
-        let mut s = [0.0; WIDTH];
-        for i in 0..WIDTH {
-            let (dx, dy) = (x[i] - place[0], y[i] - place[1]);
-            let (dz, du) = (z[i] - place[2], u[i] - place[3]);
-            let (dv, dw) = (v[i] - place[4], w[i] - place[5]);
-            let squares = (dx * dx + dy * dy) + (dz * dz + du * du) + (dv * dv + dw * dw);
-            s[i] = scale * squares.sqrt();
-        }
-        for i in 0..WIDTH {
-            out[i] = decay(s[i]);
-        }
-        if covariance.kernel == ScatteredKernel::Matern32 {
-            for i in 0..WIDTH {
-                out[i] *= 1.0 + s[i];
+fn fill_column<S: Simd>(
+    simd: S,
+    at: &Axes,
+    from: usize,
+    covariance: Covariance,
+    place: &Pair,
+    column: &mut [f64],
+) {
+    let axes = [0, 1, 2, 3, 4, 5].map(|axis| S::as_simd_f64s(at.axis(axis, from)).0);
+    let place = place.map(|x| simd.splat_f64s(x));
+    let scale = simd.splat_f64s(covariance.scale);
+    let (columns, _) = S::as_mut_simd_f64s(column);
+    for (k, out) in columns.iter_mut().enumerate() {
+        let square = |axis: usize| {
+            let off = simd.sub_f64s(axes[axis][k], place[axis]);
+            simd.mul_f64s(off, off)
+        };
+        let planar = simd.add_f64s(square(0), square(1));
+        let upright = simd.add_f64s(square(2), square(3));
+        let others = simd.add_f64s(square(4), square(5));
+        let squares = simd.add_f64s(simd.add_f64s(planar, upright), others);
+        let s = simd.mul_f64s(scale, simd.sqrt_f64s(squares));
+        let decayed = exponential(simd, simd.neg_f64s(s));
+        *out = match covariance.kernel {
+            ScatteredKernel::Exponential => decayed,
+            ScatteredKernel::Matern32 => {
+                simd.mul_f64s(decayed, simd.add_f64s(simd.splat_f64s(1.0), s))
             }
-        }
+        };
     }
 }
 
@@ -511,30 +569,33 @@ const TAYLOR: [f64; 13] = [
     1.0 / 479_001_600.0,
 ];
 
-/// e⁻ˢ.
-#[inline(always)]
-fn decay(s: f64) -> f64 {
-    exponential(-s)
-}
-
 /// eˣ with no branch; beyond ±700 as there.
 #[inline(always)]
-fn exponential(x: f64) -> f64 {
-    let x = if x < 700.0 { x } else { 700.0 };
-    let x = if x > -700.0 { x } else { -700.0 };
-    let shifted = x * std::f64::consts::LOG2_E + WHOLE;
-    let halvings = shifted - WHOLE;
-    let x = (x - halvings * LN_2[0]) - halvings * LN_2[1];
+fn exponential<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
+    let mul = |a: S::f64s, b: S::f64s| simd.mul_f64s(a, b);
+    let add = |a: S::f64s, b: S::f64s| simd.add_f64s(a, b);
+    let all = |x: f64| simd.splat_f64s(x);
+    let x = simd.max_f64s(simd.min_f64s(x, all(700.0)), all(-700.0));
+    let shifted = add(mul(x, all(std::f64::consts::LOG2_E)), all(WHOLE));
+    let halvings = simd.sub_f64s(shifted, all(WHOLE));
+    let x = simd.sub_f64s(x, mul(halvings, all(LN_2[0])));
+    let x = simd.sub_f64s(x, mul(halvings, all(LN_2[1])));
     // Estrin's scheme: few products wait for each other.
-    let c = &TAYLOR;
-    let (x2, first) = (x * x, c[0] + c[1] * x);
-    let x4 = x2 * x2;
-    let low = (first + (c[2] + c[3] * x) * x2) + ((c[4] + c[5] * x) + (c[6] + c[7] * x) * x2) * x4;
-    let high = ((c[8] + c[9] * x) + (c[10] + c[11] * x) * x2) + c[12] * x4;
-    let e = low + high * (x4 * x4);
+    let two = |k: usize| add(all(TAYLOR[k]), mul(all(TAYLOR[k + 1]), x));
+    let x2 = mul(x, x);
+    let x4 = mul(x2, x2);
+    let low = add(two(0), mul(two(2), x2));
+    let low = add(low, mul(add(two(4), mul(two(6), x2)), x4));
+    let high = add(two(8), mul(two(10), x2));
+    let high = add(high, mul(all(TAYLOR[12]), x4));
+    let e = add(low, mul(high, mul(x4, x4)));
     // The whole number becomes an exponent.
-    let exponent = shifted.to_bits().wrapping_sub(WHOLE.to_bits());
-    e * f64::from_bits(exponent.wrapping_add(1023) << 52)
+    let mut exponents = [shifted];
+    for exponent in cast_slice_mut::<S::f64s, u64>(&mut exponents) {
+        let whole = exponent.wrapping_sub(WHOLE.to_bits());
+        *exponent = whole.wrapping_add(1023) << 52;
+    }
+    mul(e, exponents[0])
 }
 
 #[cfg(test)]
@@ -543,13 +604,20 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
+    fn decay(s: f64) -> f64 {
+        let mut logs = [-s; 8];
+        exponentials(Arch::new(), &mut logs);
+        assert!(logs.iter().all(|x| *x == exponential(Scalar, -s)));
+        logs[0]
+    }
+
     #[test]
     fn decays_are_those_of_the_exponential() {
         for k in 0..4000 {
             let s = 0.17 * f64::from(k);
             let truth = (-s).exponential();
             assert!((decay(s) / truth - 1.0).abs() < 1e-14, "{s}");
-            assert!((exponential(s) * truth - 1.0).abs() < 1e-14, "{s}");
+            assert!((decay(-s) * truth - 1.0).abs() < 1e-14, "{s}");
         }
         assert!(decay(f64::INFINITY) > 0.0 && decay(1e9) < 1e-300);
     }
@@ -575,8 +643,12 @@ mod tests {
                 let correlations = Correlations::new(Arch::new(), &at, covariance);
                 let factor = correlations.factor(Arch::new(), 1e-3, &noise).unwrap();
                 let mut x = y.clone();
-                factor.forward(Arch::new(), &mut x);
-                factor.backward(Arch::new(), &mut x);
+                factor.forward(Arch::new(), [&mut x[..]]);
+                let mut narrow = x.clone();
+                narrow.resize(padded(n), 0.0);
+                Backward(&factor, [&mut narrow[..]]).with_simd(pulp::Scalar);
+                factor.backward(Arch::new(), [&mut x]);
+                assert!(x == narrow[..n]);
                 let mut k = Vec::new();
                 for i in 0..n {
                     covariances(Arch::new(), &at, covariance, &at.place(i), &mut k);
