@@ -218,15 +218,17 @@ pub struct ScatteredFit {
 
 /// Whether samples are few, and scattered: not the images of a camera, which see many directions at once.
 pub fn is_few(samples: &[Sample]) -> bool {
-    if samples.len() > 8 * FEW {
-        return false;
-    }
+    samples.len() <= 8 * FEW && !are_images(samples) && data::count_places(samples) <= FEW
+}
+
+/// Whether samples are the images of a camera, by their frames' numbers: more than a few samples a frame.
+pub fn are_images(samples: &[Sample]) -> bool {
     let mut frames: Vec<u32> = samples.iter().map(|s| s.frame).collect();
     frames.retain(|frame| *frame != Sample::NO_FRAME);
     let framed = frames.len();
     frames.sort_unstable();
     frames.dedup();
-    framed <= IMAGE * frames.len() && data::count_places(samples) <= FEW
+    framed > IMAGE * frames.len()
 }
 
 impl ScatteredFit {

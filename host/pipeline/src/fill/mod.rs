@@ -130,7 +130,7 @@ pub fn fill(
     let channels = samples.channels().clone();
     options.fits_memory(&channels)?;
     let (grid, base) = options.check()?;
-    let prepared = Prepared::new(&mut samples, grid, options, progress)?;
+    let prepared = Prepared::new(&mut samples, grid, options, true, progress)?;
     if stand_for_themselves(channels.count()) {
         samples = Vec::new().into();
     }
@@ -144,9 +144,15 @@ pub fn fill(
             })?;
             fit.choice().settings.to_string()
         }
-        (FillMethod::Blocks, None) => planes
-            .fill_by_blocks(&prepared, &samples, base, progress)?
-            .to_string(),
+        (FillMethod::Blocks, None) => {
+            let settings = planes.fill_by_blocks(&prepared, &samples, base, progress)?;
+            if prepared.turns {
+                planes.take_means_over_turns(prepared.completed_by);
+                format!("{settings}, mean over turns")
+            } else {
+                settings.to_string()
+            }
+        }
         (FillMethod::Cellwise(settings), _) => {
             let filled = step(progress, Step::Interpolating, |share| {
                 baselines::fill(&prepared.bins, &settings, share).map_err(Error::from)

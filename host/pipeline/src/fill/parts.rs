@@ -79,7 +79,7 @@ impl FillInParts {
             let remedy = "remove it, or give another folder";
             return Err(FileError::new(folder, problem, remedy).into());
         }
-        let prepared = Prepared::new(&mut samples, grid, options, progress)?;
+        let prepared = Prepared::new(&mut samples, grid, options, false, progress)?;
         if prepared.fit.is_some() {
             return Ok(Begun::OneFit);
         }

@@ -10,6 +10,7 @@ use gonia_brdf::interpolate::{AnyKernel, ErrorFall, FillSettings, NewBlock};
 use gonia_brdf::scattered::ScatteredFit;
 use gonia_brdf::{Bins, Grid, Symmetry};
 use gonia_rig::SampleValues;
+use rayon::prelude::*;
 
 /// Planes that are filled group by group.
 pub(super) struct Planes {
@@ -119,6 +120,60 @@ impl Planes {
             }
         }
     }
+
+    /// Each value becomes the mean over all turns of light and view together, and over their mirror images where the
+    /// symmetry has these, each standard error the root of the mean
+    /// square: as if turned cells had one error, which is cautious.
+    pub fn take_means_over_turns(&mut self, symmetry: Symmetry) {
+        let mirrored = symmetry == Symmetry::Isotropic;
+        for plane in &mut self.values {
+            take_means_over_turns(self.grid, mirrored, plane, |value| value, |mean| mean);
+        }
+        for plane in self.errors.iter_mut().filter(|plane| !plane.is_empty()) {
+            take_means_over_turns(self.grid, mirrored, plane, |error| error * error, f64::sqrt);
+        }
+    }
+}
+
+/// Puts in place of the values of cells that turns make of each other `back` of the mean of `of` of them.
+fn take_means_over_turns(
+    grid: Grid,
+    mirrored: bool,
+    plane: &mut [f32],
+    of: impl Fn(f64) -> f64 + Sync,
+    back: impl Fn(f64) -> f64 + Sync,
+) {
+    let (n, n_theta, n_phi) = (grid.n_directions(), grid.n_theta(), grid.n_phi());
+    let values = &*plane;
+    // Of each pair of polar angles, one a difference of azimuths.
+    let means: Vec<Vec<f32>> = (0..n_theta * n_theta)
+        .into_par_iter()
+        .map(|pair| {
+            let (light, view) = (pair / n_theta * n_phi, pair % n_theta * n_phi);
+            let mean = |apart: usize| {
+                let turned = (0..n_phi).map(|phi| {
+                    let cell = grid.cell(light + phi, view + (phi + apart) % n_phi);
+                    of(f64::from(values[cell]))
+                });
+                turned.sum::<f64>() / n_phi as f64
+            };
+            let means: Vec<f64> = (0..n_phi).map(mean).collect();
+            let at = |apart: usize| match mirrored {
+                true => 0.5 * (means[apart] + means[(n_phi - apart) % n_phi]),
+                false => means[apart],
+            };
+            (0..n_phi).map(|apart| back(at(apart)) as f32).collect()
+        })
+        .collect();
+    plane
+        .par_chunks_mut(n)
+        .enumerate()
+        .for_each(|(light, views)| {
+            for (view, value) in views.iter_mut().enumerate() {
+                let apart = (view % n_phi + n_phi - light % n_phi) % n_phi;
+                *value = means[light / n_phi * n_theta + view / n_phi][apart];
+            }
+        });
 }
 
 /// Some channels of the samples and of their images, in their bins.

@@ -4,7 +4,7 @@ use super::FillCounts;
 use super::groups::spread_over;
 use super::options::FillOptions;
 use super::origins::Origins;
-use super::symmetry::{scattered_fit, symmetry_of_many};
+use super::symmetry::{is_seen_from_all_around, scattered_fit, symmetry_of_many};
 use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
@@ -31,17 +31,21 @@ pub(super) struct Prepared {
     /// … and the images that the bins hold.
     pub completed_by: Symmetry,
     pub origins: OriginCounts,
+    /// Whether the material is isotropic and filled without that: the mean over turns is taken then.
+    pub turns: bool,
     /// Cells into which samples fell themselves, where the bins hold their images too.
     pub own: Option<Vec<u64>>,
     pub remarks: Vec<Remark>,
 }
 
 impl Prepared {
-    /// Leaves out of the samples what cannot stand.
+    /// Leaves out of the samples what cannot stand. Of an isotropic material a `whole` table may be filled first, and
+    /// its mean over turns be taken; of rows none can.
     pub fn new(
         all: &mut SampleValues,
         grid: Grid,
         options: &FillOptions,
+        whole: bool,
         progress: &Progress<'_>,
     ) -> Result<Self, Error> {
         let count = all.len();
@@ -58,13 +62,19 @@ impl Prepared {
             }
             None => (Symmetry::None, Reason::Untested),
         };
+        let turns = whole
+            && fit.is_some()
+            && symmetry.is_isotropic()
+            && reason == Reason::Asked
+            && !is_few(&samples)
+            && is_seen_from_all_around(&samples);
         let fit = fit.filter(|fit| {
             let is_few = all.channels().count() <= 3 || fit.places() <= FEW_OF_BANDS;
             let is_few = is_few && !options.asks_for_blocks();
-            let takes_place = symmetry.is_isotropic() || is_few;
+            let takes_place = !turns && (symmetry.is_isotropic() || is_few);
             let choice = fit.choice();
             let is_odd = choice.contradicted_by.is_some() || choice.plane_undetermined;
-            if takes_place || is_odd {
+            if takes_place || turns || is_odd {
                 remarks.extend(warnings::remarks_on_symmetry(fit));
             }
             takes_place
@@ -97,6 +107,7 @@ impl Prepared {
             fit,
             symmetry: format!("{symmetry}, {reason}"),
             completed_by: symmetry,
+            turns,
             origins,
             own,
             remarks,

@@ -42,7 +42,7 @@ pub fn fill_to_file(
     let channels = samples.channels().clone();
     options.check_rows(&channels)?;
     let (grid, base) = options.check()?;
-    let prepared = Prepared::new(&mut samples, grid, options, progress)?;
+    let prepared = Prepared::new(&mut samples, grid, options, false, progress)?;
     let n = channels.count();
     if stand_for_themselves(n) {
         samples = Vec::new().into();

@@ -4,7 +4,7 @@ use super::options::{CELLS_IN_MEMORY, FillMethod, FillOptions};
 use crate::Error;
 use crate::progress::{Progress, Step, step};
 use crate::warnings;
-use gonia_brdf::scattered::{ScatteredFit, is_few};
+use gonia_brdf::scattered::{ScatteredFit, are_images, is_few};
 use gonia_brdf::{Bins, Direction, Grid, Sample, Symmetry, SymmetryKind};
 use gonia_rig::Remark;
 
@@ -39,6 +39,23 @@ pub(super) fn fit_of_others(fit: &ScatteredFit, samples: &[Sample], grid: Grid) 
         fit.of_channels(&few_of(samples, grid))
     }
 }
+
+/// Whether images of an isotropic material see it from all around. Blocks in all four dimensions are nearer then, by
+/// a factor of four on plans of even rings, than a fit in three: lights of other azimuths show the same highlight between the
+/// rings, where it falls between frames that are turned to one azimuth.
+pub(super) fn is_seen_from_all_around(samples: &[Sample]) -> bool {
+    let mut seen = [false; SECTORS];
+    for sample in samples.iter().filter(|s| s.theta_i_deg > AZIMUTH_FROM_DEG) {
+        let sector = sample.phi_i_deg / 360.0 * SECTORS as f32;
+        seen[sector as usize % SECTORS] = true;
+    }
+    seen == [true; SECTORS] && are_images(samples)
+}
+
+/// Lights are all around when each of so many sectors has one …
+const SECTORS: usize = 12;
+/// … at a larger polar angle than this: nearer to the normal, one frame sees lights of all azimuths. Degrees.
+const AZIMUTH_FROM_DEG: f32 = 30.0;
 
 /// So many of many samples, at most, are looked at for a plane of symmetry, and for what contradicts it.
 const LOOKED_AT: usize = 6000;

@@ -4,8 +4,11 @@ use super::*;
 use crate::export::{ExportSource, export};
 use crate::progress::silent;
 use crate::provenance::Provenance;
+use gonia_brdf::direction::local_direction;
+use gonia_brdf::hemisphere::directions;
+use gonia_brdf::model::Ggx;
 use gonia_brdf::random::Random;
-use gonia_brdf::{Direction, Elementary, Sample, SymmetryKind};
+use gonia_brdf::{Brdf, Direction, Elementary, Sample, SymmetryKind};
 use gonia_formats::dense::read_dense_channels;
 use gonia_formats::export::export_format;
 use gonia_rig::{ChannelSamples, Channels};
@@ -329,4 +332,93 @@ fn a_fit_about_a_stated_plane_is_made_again_about_it() {
     };
     let plane = fit.choice().settings.symmetry.plane();
     assert_eq!(plane.map(gonia_brdf::MirrorPlane::azimuth_deg), Some(20.0));
+}
+
+/// Frames of 49 points of an isotropic gloss, with lights at some azimuths.
+fn frames_of_gloss(
+    gloss: &Ggx,
+    lights: &[(f64, usize)],
+    lights_at_deg: impl Fn(f64) -> f64,
+) -> Vec<Sample> {
+    let (lights, views) = (
+        directions(lights),
+        directions(&[(0.0, 1), (25.0, 6), (50.0, 12), (72.0, 16)]),
+    );
+    let mut samples = Vec::new();
+    for (k, light) in lights.iter().enumerate() {
+        let light = Direction::from_deg(light.theta_deg(), lights_at_deg(light.phi_deg()));
+        for (m, view) in views.iter().enumerate() {
+            for (x, y) in (-3..=3).flat_map(|x| (-3..=3).map(move |y| (f64::from(x), f64::from(y))))
+            {
+                let point = [0.07 * x, 0.07 * y];
+                let (l, v) = (
+                    local_direction(light, 1.1, point),
+                    local_direction(*view, 1.8, point),
+                );
+                let rgb = gloss.eval(l, v).map(|value| value as f32);
+                let (l, v) = (Direction::from_vec3(l), Direction::from_vec3(v));
+                samples.push(Sample::new(l, v, rgb).in_frame((k * views.len() + m) as u32));
+            }
+        }
+    }
+    samples
+}
+
+#[test]
+fn an_isotropic_material_seen_from_all_around_is_the_mean_over_turns_and_nearer_than_without() {
+    let gloss = Ggx {
+        diffuse: [0.1, 0.2, 0.3],
+        specular: [1.0; 3],
+        f0: 0.04,
+        alpha_x: 0.25,
+        alpha_y: 0.25,
+        azimuth_deg: 0.0,
+    };
+    let rings = [(0.0, 1), (25.0, 6), (50.0, 12), (72.0, 16), (85.0, 16)];
+    let all_around = frames_of_gloss(&gloss, &rings, |phi| phi);
+    let error_with = |samples: &[Sample], symmetry| {
+        let options = FillOptions {
+            symmetry: Some(symmetry),
+            ..FillOptions::with_step_deg(6.0)
+        };
+        let filled = fill(samples.to_vec(), Scale::Absolute, &options, &silent).unwrap();
+        let (grid, plane) = (filled.dense.grid, &filled.dense.planes[1]);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for light in (0..grid.n_directions()).step_by(7) {
+            for view in (0..grid.n_directions()).step_by(5) {
+                let (i, v) = (grid.direction(light), grid.direction(view));
+                if i.theta_deg().max(v.theta_deg()) < 75.0 {
+                    let truth = gloss.eval(i.to_vec3(), v.to_vec3())[1];
+                    let off = (f64::from(plane[grid.cell(light, view)]) / truth).natural_log();
+                    sum += off * off;
+                    count += 1.0;
+                }
+            }
+        }
+        ((sum / count).sqrt(), filled)
+    };
+    let (none, _) = error_with(&all_around, SymmetryKind::None);
+    let (isotropic, filled) = error_with(&all_around, SymmetryKind::Isotropic);
+    assert!(isotropic < none, "{isotropic} with, {none} without: {}", filled.account.settings);
+    assert!(
+        filled.account.settings.ends_with("mean over turns"),
+        "{}",
+        filled.account.settings
+    );
+    assert!(filled.account.symmetry.starts_with("isotropic"));
+    let (grid, plane) = (filled.dense.grid, &filled.dense.planes[1]);
+    let n_phi = grid.n_phi();
+    let at = |light: usize, view: usize| {
+        plane[grid.cell(5 * n_phi + light % n_phi, 7 * n_phi + view % n_phi)]
+    };
+    for turn in 1..n_phi {
+        assert_eq!(at(0, 9), at(turn, 9 + turn));
+        assert_eq!(at(0, 9), at(turn, turn + n_phi - 9));
+    }
+    // Of lights at one azimuth the frames themselves say nothing of the others.
+    let (_, filled) = error_with(
+        &frames_of_gloss(&gloss, &rings, |_| 40.0),
+        SymmetryKind::Isotropic,
+    );
+    assert!(!filled.account.settings.contains("turns"));
 }
