@@ -399,7 +399,11 @@ fn an_isotropic_material_seen_from_all_around_is_the_mean_over_turns_and_nearer_
     };
     let (none, _) = error_with(&all_around, SymmetryKind::None);
     let (isotropic, filled) = error_with(&all_around, SymmetryKind::Isotropic);
-    assert!(isotropic < none, "{isotropic} with, {none} without: {}", filled.account.settings);
+    assert!(
+        isotropic < none,
+        "{isotropic} with, {none} without: {}",
+        filled.account.settings
+    );
     assert!(
         filled.account.settings.ends_with("mean over turns"),
         "{}",
