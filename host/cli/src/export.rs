@@ -7,12 +7,13 @@ use crate::say::outln;
 use crate::table::{self, bytes, count};
 use anyhow::{Result, bail};
 use gonia_formats::check_output;
-use gonia_formats::dense::{are_errors_of, read_dense_channels};
+use gonia_formats::checksum::of_channels;
+use gonia_formats::dense::{ERRORS_OF, read_dense_channels};
 use gonia_formats::export::{ExportFormat, check_new_folder, export_format, export_table};
 use gonia_formats::samples::read_channels;
 use gonia_pipeline::export::{ExportError, ExportSource, Places, export};
 use gonia_pipeline::export_samples::{SamplesExport, export_samples};
-use gonia_rig::Scale;
+use gonia_rig::{DenseChannels, Scale};
 use std::path::{Path, PathBuf};
 
 /// Writes a dense BRDF in the format of another program, and says how far that file is from it; or samples in BiRD's.
@@ -191,8 +192,7 @@ impl Export {
         let dense = read_dense_channels(path)?;
         let errors = self.error.as_deref().map(|errors| {
             let read = read_dense_channels(errors)?;
-            let of = (read.grid, &read.channels, &read.provenance);
-            if read.scale == dense.scale && are_errors_of(of, &dense) {
+            if fits(&dense, &read) {
                 return Ok(read);
             }
             bail!(
@@ -223,6 +223,15 @@ impl Export {
             (None, resolution) => resolution.as_ref().map_or(0, |r| r.default),
         })
     }
+}
+
+/// Whether error bars are those of a table: of its grid, channels and scale, and of its checksum where they hold one.
+fn fits(dense: &DenseChannels, errors: &DenseChannels) -> bool {
+    let of = errors.provenance.get(ERRORS_OF);
+    dense.grid == errors.grid
+        && dense.channels == errors.channels
+        && dense.scale == errors.scale
+        && of.is_none_or(|of| *of == of_channels(dense))
 }
 
 /// Bytes of a file, or of all files in a folder.
