@@ -363,6 +363,35 @@ fn on_few_poses_presets_choose_alike_and_the_slower_is_the_nearer() {
 }
 
 /// RMS of ln(f/f_true) where both θ ≤ 75°, of one light in 29.
+#[test]
+fn beyond_all_that_was_measured_a_lobe_goes_on_rising() {
+    // Both polar angles above 78 degrees: no frame shows them, and a broad lobe rises there as far again as on the whole
+    // edge of what was measured.
+    let grid = Grid::with_step_deg(4.0).unwrap();
+    let model = Kurt::white_reference_fabric();
+    let bins = Bins::new(grid, &measure_every(2, &model));
+    let data = Data::new(&bins);
+    let settings = select(&data, FillSettings::DEFAULT).settings;
+    let dense = fill(&data, &settings, &silent).unwrap();
+    let beyond = |d: &usize| grid.direction(*d).theta_deg() > 78.0;
+    let directions: Vec<usize> = (0..grid.n_directions()).filter(beyond).collect();
+    let pairs = directions
+        .iter()
+        .flat_map(|i| directions.iter().map(move |v| (*i, *v)));
+    let squares: Vec<f64> = pairs
+        .map(|(light, view)| {
+            let [i, v] = [light, view].map(|d| grid.direction(d).to_vec3());
+            let truth = model.eval(i, v)[1];
+            (f64::from(dense.at(light, view)[1]) / truth)
+                .natural_log()
+                .powi(2)
+        })
+        .collect();
+    let error = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+    println!("log RMS {error:.4}");
+    assert!(error < 0.03, "{error}");
+}
+
 fn interior_error(dense: &DenseBrdf, model: &dyn Brdf) -> f64 {
     let grid = dense.grid();
     let inside: Vec<usize> = (0..grid.n_directions())

@@ -6,6 +6,7 @@ use super::block::kernel::{AnyKernel, NewBlock};
 use super::data::Data;
 use super::error_bars::{Calibration, ErrorBars};
 use super::exponential::exponentials;
+use super::extrapolation::Extrapolation;
 use super::hierarchy::Hierarchy;
 use super::origin::origins;
 use super::patches::{Cover, Patch, cover};
@@ -95,6 +96,7 @@ where
             values.store(grid, (p, q), solved.cells);
         }
         if let Some(calibration) = calibration {
+            let factor = task.error_factor((p, q));
             let directions = p
                 .vectors
                 .iter()
@@ -102,7 +104,8 @@ where
             let relative: Vec<[f32; N]> = directions
                 .zip(solved.cells.iter().zip(solved.variances))
                 .map(|((light, view), (log, variance))| {
-                    calibration.standard_error(light, view, *log, *variance)
+                    let errors = calibration.standard_error(light, view, *log, *variance);
+                    errors.map(|error| factor * error)
                 })
                 .collect();
             errors.store(grid, (p, q), &relative);
@@ -165,6 +168,8 @@ pub(super) struct Task<'a, const N: usize> {
     pub settings: &'a FillSettings,
     data: &'a Data<'a, N>,
     moved: Option<Hierarchy<N>>,
+    /// How pairs beyond all that was measured are solved; `None` where they are solved as all others.
+    extrapolation: Option<Extrapolation<'a, N>>,
     pub cover: Cover,
 }
 
@@ -181,18 +186,34 @@ where
             return Err(FillError::TooFewBins(bins.bins().len()));
         }
         let grid = bins.grid();
+        let cover = cover(grid, &settings.patch_sizes_deg());
         Ok(Self {
             grid,
             settings,
             data,
             moved: data.moved(settings.coordinates),
-            cover: cover(grid, &settings.patch_sizes_deg()),
+            extrapolation: Extrapolation::new(data, settings, &cover.patches),
+            cover,
         })
     }
 
     /// The data, in the coordinates of the settings.
     pub(super) fn hierarchy(&self) -> &Hierarchy<N> {
         self.moved.as_ref().unwrap_or(self.data.hierarchy())
+    }
+
+    /// By what the standard errors of a pair of patches are multiplied.
+    fn error_factor(&self, pair: (&Patch, &Patch)) -> f32 {
+        let beyond = self.extrapolation.as_ref().filter(|e| e.is_beyond(pair));
+        beyond.map_or(1.0, Extrapolation::error_factor)
+    }
+
+    /// What a pair of patches is solved from.
+    fn data_and_settings(&self, pair: (&Patch, &Patch)) -> (&Hierarchy<N>, &FillSettings) {
+        let beyond = self.extrapolation.as_ref().filter(|e| e.is_beyond(pair));
+        beyond.map_or((self.hierarchy(), self.settings), |e| {
+            (e.hierarchy(), e.settings())
+        })
     }
 
     /// Solves the pairs of some patches with themselves and all later ones. Each pair is given to `each`, and
@@ -222,8 +243,8 @@ where
                     let (mut at_corners, mut kept) = (AtCorners::default(), K::default());
                     for q in &all[p..] {
                         let pair = (&all[p], q);
-                        let solved =
-                            refiner.solve(self.hierarchy(), self.settings, pair, with_variances);
+                        let (data, settings) = self.data_and_settings(pair);
+                        let solved = refiner.solve(data, settings, pair, with_variances);
                         at_corners.values.extend_from_slice(solved.corners);
                         at_corners.smooth.push(solved.is_smooth);
                         each(&mut kept, solved, pair);

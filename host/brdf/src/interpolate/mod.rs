@@ -19,6 +19,7 @@ pub mod datum;
 pub mod error_bars;
 mod error_fall;
 pub mod exponential;
+mod extrapolation;
 pub mod fill;
 pub mod from_corners;
 pub mod hierarchy;
@@ -74,6 +75,9 @@ pub struct FillSettings {
     pub noise_variance: f32,
     /// Smallest nugget.
     pub nugget_min: f32,
+    /// How far a block's values may lie beyond those of its data: by this share of their range, and by twice as many natural
+    /// logarithms at most, 0 ..= ∞. What lies beyond all that was measured may rise more.
+    pub beyond: f32,
 }
 
 /// Points of the front of speed against accuracy; docs/src/figures/accuracy.md has their figures.
@@ -130,6 +134,7 @@ impl Preset {
             range: 8.0,
             noise_variance: 1e-4,
             nugget_min: 1e-4,
+            beyond: BEYOND,
         }
     }
 }
@@ -175,12 +180,15 @@ impl FillSettings {
             noise_variance: self.noise_variance,
             nugget_min: self.nugget_min,
             drift: self.coordinates.drift(),
+            beyond: self.beyond,
         }
     }
 }
 
 /// Relative errors below this are not refined: of a grey they are 116/3 · ∛Y · 0.002 in L*, less than a tenth at any Y.
 const TARGET_ERROR: f32 = 0.002;
+/// A peak between data is higher than these by no more than this share of their range.
+const BEYOND: f32 = 0.5;
 /// Two fits through different data never agree better than this, whatever the samples' noise.
 const NOISE_MIN: f32 = 0.003;
 

@@ -114,20 +114,14 @@ impl Reach {
     fn new<const N: usize>(bins: &Bins<N>) -> Self {
         let grid = bins.grid();
         let n_phi = grid.n_phi();
-        let mut rows = vec![0; grid.n_theta()];
         let mut measured = [(); 2].map(|()| vec![false; grid.n_directions()]);
         for bin in bins.bins() {
             let (light, view) = grid.light_and_view(bin.cell as usize);
-            let (i, v) = (light / n_phi, view / n_phi);
-            rows[i] = rows[i].max(v + 1);
-            rows[v] = rows[v].max(i + 1);
             measured[0][light] = true;
             measured[1][view] = true;
         }
-        for row in (1..rows.len()).rev() {
-            rows[row - 1] = rows[row - 1].max(rows[row]);
-        }
         let near = measured.map(|measured| near(grid, &measured));
+        let rows = rows_within_reach(bins);
         Self { n_phi, rows, near }
     }
 
@@ -175,6 +169,23 @@ impl Reach {
     }
 }
 
+/// By row of the grid: one more than the highest row measured with this row or a higher one, of light and view in either
+/// order. Rows from there on lie beyond all that was measured.
+pub(super) fn rows_within_reach<const N: usize>(bins: &Bins<N>) -> Vec<usize> {
+    let grid = bins.grid();
+    let mut rows = vec![0; grid.n_theta()];
+    for bin in bins.bins() {
+        let (light, view) = grid.light_and_view(bin.cell as usize);
+        let (i, v) = (light / grid.n_phi(), view / grid.n_phi());
+        rows[i] = rows[i].max(v + 1);
+        rows[v] = rows[v].max(i + 1);
+    }
+    for row in (1..rows.len()).rev() {
+        rows[row - 1] = rows[row - 1].max(rows[row]);
+    }
+    rows
+}
+
 /// The directions within a gap's width of a measured one.
 fn near(grid: Grid, measured: &[bool]) -> Vec<bool> {
     let vector = |d: usize| grid.direction(d).to_vec3();
@@ -206,7 +217,7 @@ impl IsotropicOrigins {
     pub fn of<const N: usize>(bins: &Bins<N>, sides_alike: bool) -> Self {
         let grid = bins.grid();
         let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
-        let rows = Reach::new(bins).rows;
+        let rows = rows_within_reach(bins);
         let mut measured = [(); 2].map(|()| vec![false; n_theta]);
         let mut cells = Vec::new();
         for bin in bins.bins() {

@@ -42,7 +42,7 @@ struct Text {
 }
 
 /// The settings' names in the file.
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 14] = [
     "block_deg",
     "tolerance",
     "target_error",
@@ -56,6 +56,7 @@ const NAMES: [&str; 13] = [
     "range",
     "noise_variance",
     "nugget_min",
+    "beyond",
 ];
 
 impl FillPlan {
@@ -79,6 +80,7 @@ impl FillPlan {
             s.range.to_string(),
             s.noise_variance.to_string(),
             s.nugget_min.to_string(),
+            s.beyond.to_string(),
         ];
         let names = NAMES.map(str::to_owned);
         let text = Text {
@@ -162,6 +164,7 @@ fn settings_of(text: &BTreeMap<String, String>) -> Option<FillSettings> {
         range: number(text, "range")?,
         noise_variance: number(text, "noise_variance")?,
         nugget_min: number(text, "nugget_min")?,
+        beyond: number(text, "beyond")?,
     };
     let is_sound = settings.block_deg > 0.0
         && settings.block_deg <= 90.0

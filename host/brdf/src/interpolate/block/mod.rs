@@ -33,6 +33,8 @@ pub struct BlockSettings {
     pub nugget_min: f32,
     /// External drift: the process is that of the logarithms less this.
     pub drift: Drift,
+    /// By what share of their range values may lie beyond the data's, and by twice as many natural logarithms at most.
+    pub beyond: f32,
 }
 
 /// The widest vectors in use hold 16 numbers; buffers are padded to it.
@@ -106,7 +108,8 @@ impl<K: Kernel, const N: usize> Block<N> for KrigingBlock<K, N> {
         let second = scale * settings.anisotropy;
         process.scale = [scale, scale, scale, second, second, second];
         process.load(data, padded);
-        process.limits = std::array::from_fn(|c| limits_of(&process.log_values[c][..n]));
+        process.limits =
+            std::array::from_fn(|c| limits_of(&process.log_values[c][..n], settings.beyond));
         if n >= 2 {
             let mut nugget = None;
             // A pivot lost to rounding is mended by a larger nugget; the last of these makes any
@@ -270,19 +273,21 @@ impl<const N: usize> Process<N> {
     }
 }
 
-/// A value may lie beyond those around by this share of their range, as a peak between them does …
-const BEYOND_SHARE: f32 = 0.5;
-/// … and by this in any case, but never by more than that, in natural logarithms.
-const BEYOND: (f32, f32) = (0.1, 1.0);
+/// A value may lie beyond those around by this in any case, in natural logarithms …
+const BEYOND_LEAST: f32 = 0.1;
+/// … and by no more than the share of their range that settings allow, times this.
+const BEYOND_MOST: f32 = 2.0;
 
-fn limits_of(values: &[f32]) -> (f32, f32) {
+fn limits_of(values: &[f32], share: f32) -> (f32, f32) {
     let low = values.iter().copied().fold(f32::INFINITY, f32::min);
     let high = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     if low > high {
         // Of no data.
         return (f32::NEG_INFINITY, f32::INFINITY);
     }
-    let beyond = (BEYOND_SHARE * (high - low)).clamp(BEYOND.0, BEYOND.1);
+    let beyond = (share * (high - low))
+        .min(BEYOND_MOST * share)
+        .max(BEYOND_LEAST);
     (low - beyond, high + beyond)
 }
 
@@ -299,6 +304,7 @@ mod tests {
         noise_variance: 1e-6,
         nugget_min: 1e-4,
         drift: Drift::NONE,
+        beyond: 0.5,
     };
 
     fn datum(x: f32, y: f32, count: f32) -> Datum {
