@@ -2,11 +2,11 @@
 
 use super::groups::{groups, spread_over};
 use crate::Error;
-use crate::budget::{Equation, PLACES, Part, Slant, places, shape};
+use crate::budget::{Equation, PLACES, Part, SidesOfSamples, Slant, places, shape};
 use crate::warnings;
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
-use gonia_brdf::{Direction, Elementary, MirrorPlane, Sample, SymmetryKind};
+use gonia_brdf::{Direction, Elementary, MirrorPlane, Sample, Symmetry, SymmetryKind};
 use gonia_rig::{Budget, Channels, Remark, SampleValues};
 
 /// More samples than this are not asked without a grid.
@@ -18,6 +18,8 @@ pub struct FitOfSamples {
     /// Fits of some of the channels, each with the numbers of its three.
     groups: Vec<([usize; 3], ScatteredFit)>,
     choice: Choice,
+    /// Where the samples lie; empty where values follow from their images by a symmetry too.
+    measured: Vec<(Direction, Direction)>,
 }
 
 impl FitOfSamples {
@@ -73,6 +75,10 @@ impl FitOfSamples {
         if choice.reason == Reason::Assumed {
             remarks.push(warnings::remark_on_assumed_isotropy());
         }
+        let measured = match choice.settings.symmetry {
+            Symmetry::None => spread.iter().map(directions_of).collect(),
+            _ => Vec::new(),
+        };
         let mut of_all = groups::<3>(n);
         let groups = if of_all == [spread_over(n)] {
             of_all
@@ -88,6 +94,7 @@ impl FitOfSamples {
             channels: samples.channels().clone(),
             groups,
             choice,
+            measured,
         };
         Ok((fit, remarks))
     }
@@ -110,18 +117,25 @@ impl FitOfSamples {
         budget: Option<&Budget>,
     ) -> Vec<Vec<[f32; 2]>> {
         let equation = budget.map(Equation::new);
+        let sides = equation
+            .as_ref()
+            .and_then(|_| SidesOfSamples::of(self.measured.iter().copied()));
+        let there = |pair: &(Direction, Direction)| {
+            sides.as_ref().map_or(0.5, |of| of.there(pair.0, pair.1))
+        };
         let asked: Vec<_> = pairs.iter().flat_map(|(i, v)| places(*i, *v)).collect();
         let mut all = vec![vec![[0.0f32; 2]; self.channels.count()]; pairs.len()];
         for (channels, fit) in &self.groups {
             let found = fit.at_all(&asked);
             let (found, _) = found.as_chunks::<PLACES>();
             for ((about, out), (light, view)) in found.iter().zip(&mut all).zip(pairs) {
+                let there = there(&(*light, *view));
                 for (c, channel) in channels.iter().enumerate() {
                     let (value, noise) = (about[0].0[c], about[0].1[c]);
                     let known = equation.as_ref().map_or(0.0, |equation| {
                         let shape = shape(&about.map(|(value, _)| value[c]));
                         let (light, view) = (Slant::of(*light), Slant::of(*view));
-                        let effects = equation.of_reciprocal((&light, &view), &shape, 0.5);
+                        let effects = equation.of_reciprocal((&light, &view), &shape, there);
                         value
                             * effects
                                 .u(Part::Direction)
@@ -146,4 +160,11 @@ impl FitOfSamples {
         }
         values
     }
+}
+
+fn directions_of(sample: &Sample) -> (Direction, Direction) {
+    (
+        Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into()),
+        Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into()),
+    )
 }
