@@ -4,6 +4,7 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
 use super::narrow::Narrow;
+use super::patches::{PatchPair, pairs};
 use super::places::{Near, distance2, exchanged, radius_of};
 use super::planes::{Block, Rows, planes_of, three};
 use super::quadratic::{By, Cells, Determined, Few, Stages, weights};
@@ -13,12 +14,10 @@ use crate::direction::Direction;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
-use crate::symmetry::Symmetry;
+use crate::symmetry::{MirrorPlane, Reflection};
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// Side of the patches of directions that the work begins with, degrees.
-const PATCH_DEG: f64 = 16.0;
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
 const SHARED: f64 = 1.0;
 /// Quarters of the neighbours of one place that a system of many has.
@@ -64,26 +63,42 @@ impl Systems {
     }
 }
 
-/// Cells that share systems, and what holds for all of them.
-struct Shares<'a> {
+/// Systems, and how near their values are needed.
+struct Solved<'a> {
     systems: &'a Systems,
     /// The same in single precision, where that is near enough.
     narrow: Option<Narrow>,
-    pair: &'a Cells,
-    cells: Cells,
     /// What logarithms may be off by.
     tolerance: f64,
+}
+
+/// Cells that share systems, and what holds for all of them.
+struct Shares<'a> {
+    solved: &'a Solved<'a>,
+    /// The pair of patches that they are of.
+    pair: &'a Cells,
+    cells: Cells,
+    /// The plane of symmetry, where the systems are of the cells beyond it.
+    beyond: Option<Reflection>,
     /// Relative standard errors at the nodes, channel by channel, where errors are wanted.
     errors: Vec<Vec<f64>>,
 }
 
 impl Shares<'_> {
     fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
-        match &self.narrow {
-            Some(narrow) => self.systems.own.logs_of(narrow.sums(place)),
-            None => self.systems.logs_at(place, work),
+        let place = &self.beyond.map_or(*place, |plane| plane.of(place));
+        match &self.solved.narrow {
+            Some(narrow) => self.solved.systems.own.logs_of(narrow.sums(place)),
+            None => self.solved.systems.logs_at(place, work),
         }
     }
+}
+
+/// Values and errors of a pair of patches.
+#[derive(Default)]
+struct Blocks {
+    values: Block,
+    errors: Block,
 }
 
 /// Memory of one thread.
@@ -92,9 +107,8 @@ struct Memory {
     work: Work,
     stages: Stages,
     relative: Vec<f64>,
-    /// Values and errors of the pair of patches that is worked on.
-    block: Block,
-    errors: Block,
+    /// The pair of patches that is worked on, and the one beyond the plane of symmetry.
+    blocks: [Blocks; 2],
 }
 
 struct Filler<'a> {
@@ -105,7 +119,8 @@ struct Filler<'a> {
     /// The system of all data, where they are few.
     one: Option<Systems>,
     arch: Arch,
-    /// Sine and cosine of every quarter of a step, up to a turn.
+    plane: Option<Reflection>,
+    /// Sine and cosine of every quarter of a step, up to two turns.
     angles: Vec<(f64, f64)>,
 }
 
@@ -132,6 +147,8 @@ impl ScatteredFit {
             true => 1,
             false => 3,
         };
+        let symmetry = self.choice.settings.symmetry;
+        let turn = PARTS as usize * grid.n_phi();
         let mut filler = Filler {
             fit: self,
             grid,
@@ -139,9 +156,10 @@ impl ScatteredFit {
             with_errors,
             one: None,
             arch: Arch::new(),
-            angles: (0..=(PARTS as usize * grid.n_phi()))
+            plane: symmetry.plane().map(MirrorPlane::reflection),
+            angles: (0..=2 * turn)
                 .map(|k| {
-                    (k as f64 / PARTS * grid.step_deg())
+                    ((k % turn) as f64 / PARTS * grid.step_deg())
                         .to_radians()
                         .sine_cosine()
                 })
@@ -154,21 +172,25 @@ impl ScatteredFit {
             filler.one = filler.systems(&near);
         }
         let mut values = planes_of(grid, channels);
-        let mut errors = planes_of(grid, if with_errors { channels } else { 0 });
+        let errors_of = if with_errors { channels } else { 0 };
+        let mut errors = planes_of(grid, errors_of);
         let rows = Rows::of(grid, &mut values);
         let rows_of_errors = Rows::of(grid, &mut errors);
-        pairs(grid, self.choice.settings.symmetry)
+        // What shares one system anyway need not lie side by side.
+        pairs(grid, symmetry, filler.one.is_none())
             .par_iter()
             .with_max_len(8)
             .for_each_init(Memory::default, |memory, pair| {
-                memory.block.clear(pair, channels);
-                if with_errors {
-                    memory.errors.clear(pair, channels);
+                let beyond = pair.beyond.map(|beyond| beyond.cells);
+                let both = || std::iter::once(pair.cells).chain(beyond);
+                for (cells, blocks) in both().zip(&mut memory.blocks) {
+                    blocks.values.clear(&cells, channels);
+                    blocks.errors.clear(&cells, errors_of);
                 }
-                filler.fill(pair, *pair, f64::INFINITY, memory);
-                memory.block.store(pair, grid, &rows);
-                if with_errors {
-                    memory.errors.store(pair, grid, &rows_of_errors);
+                filler.fill(pair, pair.cells, f64::INFINITY, memory);
+                for (cells, blocks) in both().zip(&mut memory.blocks) {
+                    blocks.values.store(&cells, grid, &rows);
+                    blocks.errors.store(&cells, grid, &rows_of_errors);
                 }
             });
         let errors = with_errors.then(|| three(grid, errors));
@@ -176,58 +198,22 @@ impl ScatteredFit {
     }
 }
 
-/// The first row and column of a patch of directions, and their ends.
-type Patch = [[usize; 2]; 2];
-
-/// The pairs of patches that all others follow from.
-fn pairs(grid: Grid, symmetry: Symmetry) -> Vec<Cells> {
-    let rings = rings(grid);
-    let patches: Vec<Patch> = rings.iter().flatten().copied().collect();
-    // Half a turn on lies the patch half a ring further.
-    let mut turned = Vec::with_capacity(patches.len());
-    for ring in &rings {
-        let (first, n) = (turned.len(), ring.len());
-        turned.extend((0..n).map(|k| first + (k + n / 2) % n));
-    }
-    let mut pairs = Vec::new();
-    for p in 0..patches.len() {
-        for q in p..patches.len() {
-            let other = (turned[p].min(turned[q]), turned[p].max(turned[q]));
-            let is_half_turn = symmetry.has_half_turn();
-            if is_half_turn && other < (p, q) {
-                continue;
+/// Puts values at nodes in the order that the nodes beyond a plane have: those of azimuths are turned over.
+fn turn_over(values: &mut [f64], nodes: [usize; 4]) {
+    for views in values.chunks_exact_mut(nodes[1] * nodes[2] * nodes[3]) {
+        // All four axes from the last to the first, …
+        views.reverse();
+        let rows = views.chunks_exact_mut(nodes[2] * nodes[3]);
+        for views in rows {
+            // … and the polar angle of view back.
+            let (mut low, mut high) = (0, nodes[2] - 1);
+            while low < high {
+                let (first, last) = views.split_at_mut(high * nodes[3]);
+                first[low * nodes[3]..][..nodes[3]].swap_with_slice(&mut last[..nodes[3]]);
+                (low, high) = (low + 1, high - 1);
             }
-            let ([a, b], [c, d]) = (patches[p], patches[q]);
-            pairs.push(Cells {
-                start: [a[0], a[1], c[0], c[1]],
-                end: [b[0], b[1], d[0], d[1]],
-                is_own: p == q,
-                is_turned: is_half_turn && other != (p, q),
-            });
         }
     }
-    pairs
-}
-
-/// Patches of directions, about as wide as high, ring by ring: the pole, then even numbers of them.
-fn rings(grid: Grid) -> Vec<Vec<Patch>> {
-    let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
-    let count = ((n_theta - 1) as f64 * grid.step_deg() / PATCH_DEG).ceil() as usize;
-    let count = count.clamp(1, (n_theta - 1).max(1));
-    // All azimuths of the pole are one direction.
-    let mut rings = vec![vec![[[0, 0], [1, 1]]]];
-    for ring in 0..count {
-        let [first, end] = [ring, ring + 1].map(|r| 1 + r * (n_theta - 1) / count);
-        let theta = (0.5 * (first + end - 1) as f64 * grid.step_deg()).to_radians();
-        let across = 2 * (180.0 * theta.sine() / PATCH_DEG).ceil() as usize;
-        let across = across.clamp(4, n_phi);
-        let patch = |k: usize| {
-            let [left, right] = [k, k + 1].map(|k| k * n_phi / across);
-            [[first, left], [end, right]]
-        };
-        rings.push((0..across).map(patch).collect());
-    }
-    rings
 }
 
 /// The data around a place, and where they contradict reciprocity, around the reciprocal one.
@@ -276,7 +262,7 @@ impl Filler<'_> {
 
     /// Fills cells: by one system where they are small against its neighbourhood, else half by half.
     /// `around` is the radius around those that they are half of.
-    fn fill(&self, pair: &Cells, cells: Cells, around: f64, memory: &mut Memory) {
+    fn fill(&self, pair: &PatchPair, cells: Cells, around: f64, memory: &mut Memory) {
         let number = |row: usize, column: usize| row * self.grid.n_phi() + column;
         let first_light = number(cells.start[0], cells.start[1]);
         if cells.is_own && first_light > number(cells.end[2] - 1, cells.end[3] - 1) {
@@ -287,10 +273,7 @@ impl Filler<'_> {
             return self.share(one, pair, (cells, f64::INFINITY), memory);
         }
         let middle = self.place(cells.middle());
-        let reach = (0..16)
-            .map(|bits| distance2(&self.place(cells.corner(bits)), &middle))
-            .fold(0.0, f64::max)
-            .sqrt();
+        let reach = self.reach_from(&middle, pair, &cells);
         let halve = |radius: f64, memory: &mut Memory| {
             for half in cells.halves(self.longest(&cells)) {
                 self.fill(pair, half, radius, memory);
@@ -305,6 +288,20 @@ impl Filler<'_> {
         } else if let Some(systems) = self.systems(&near) {
             self.share(&systems, pair, (cells, reach), memory);
         }
+    }
+
+    /// How far corners of cells are from a place, and corners of those beyond the plane of symmetry from its image.
+    fn reach_from(&self, middle: &Pair, pair: &PatchPair, cells: &Cells) -> f64 {
+        let corners = |cells: Cells| (0..16).map(move |bits| self.place(cells.corner(bits)));
+        let beyond = self.plane.zip(pair.beyond).map(|(plane, beyond)| {
+            let image = plane.of(middle);
+            corners(beyond.of(cells)).map(move |corner| distance2(&corner, &image))
+        });
+        corners(*cells)
+            .map(|corner| distance2(&corner, middle))
+            .chain(beyond.into_iter().flatten())
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     /// The axes of more than two cells, that along which they reach farthest first.
@@ -330,11 +327,12 @@ impl Filler<'_> {
         longest.unwrap_or(0)
     }
 
-    /// Fills cells, none of which is farther from their middle than they reach, by systems that they share.
+    /// Fills cells, none of which is farther from their middle than they reach, and those beyond the plane of symmetry, by
+    /// systems that they share.
     fn share(
         &self,
         systems: &Systems,
-        pair: &Cells,
+        pair: &PatchPair,
         (cells, reach): (Cells, f64),
         memory: &mut Memory,
     ) {
@@ -352,15 +350,29 @@ impl Filler<'_> {
         let tolerance = TOLERANCE * self.fit.choice.error_factor * relative;
         let tolerance = tolerance.max(TOLERANCE_MIN);
         let narrow = || systems.own.narrow((at, reach), NARROW * tolerance);
-        let shares = Shares {
+        let solved = Solved {
             systems,
             narrow: systems.reciprocal.is_none().then(narrow).flatten(),
-            pair,
-            cells,
             tolerance,
+        };
+        let mut shares = Shares {
+            solved: &solved,
+            pair: &pair.cells,
+            cells,
+            beyond: None,
             errors,
         };
         self.refine(&shares, cells, memory);
+        let Some(beyond) = &pair.beyond else {
+            return;
+        };
+        // Errors change little over the half a step, at most, by which these cells miss the images of the others.
+        let nodes = [0, 1, 2, 3].map(|axis| cells.length(axis).min(3));
+        shares.errors.iter_mut().for_each(|e| turn_over(e, nodes));
+        shares.pair = &beyond.cells;
+        shares.cells = beyond.of(&cells);
+        shares.beyond = self.plane;
+        self.refine(&shares, shares.cells, memory);
     }
 
     /// Logarithms of relative standard errors at all nodes of cells, channel by channel. Between the few that are computed
@@ -534,7 +546,7 @@ impl Filler<'_> {
                     bends[axis] = (found[c] - between).abs().max(bends[axis]);
                 }
             }
-            are_quadratic = bends.iter().sum::<f64>() <= shares.tolerance;
+            are_quadratic = bends.iter().sum::<f64>() <= shares.solved.tolerance;
             if !are_quadratic {
                 break;
             }
@@ -572,14 +584,15 @@ impl Filler<'_> {
                     by,
                     values,
                 };
-                (of.at(cell) - found).abs() <= shares.tolerance
+                (of.at(cell) - found).abs() <= shares.solved.tolerance
             })
         })
     }
 
     fn store(&self, shares: &Shares<'_>, part: Cells, channels: &[Vec<f64>], memory: &mut Memory) {
         for (c, values) in channels.iter().enumerate() {
-            memory.block.put(shares.pair, &part, c, values);
+            let blocks = &mut memory.blocks[usize::from(shares.beyond.is_some())];
+            blocks.values.put(shares.pair, &part, c, values);
             if !self.with_errors {
                 continue;
             }
@@ -594,8 +607,7 @@ impl Filler<'_> {
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;
             }
-            let errors = &mut memory.errors;
-            errors.put(shares.pair, &part, c, &memory.relative);
+            blocks.errors.put(shares.pair, &part, c, &memory.relative);
         }
     }
 }

@@ -14,6 +14,7 @@ mod merge;
 mod mirror;
 mod narrow;
 mod nugget;
+mod patches;
 mod places;
 mod planes;
 mod quadratic;
@@ -756,5 +757,43 @@ mod tests {
         };
         assert!(is_few(&of_material(300, false, 1.0, 0.0)) && is_few(&framed(1)));
         assert!(!is_few(&framed(50)));
+    }
+
+    #[test]
+    fn cells_beyond_a_plane_of_symmetry_are_as_near_to_the_fit_as_those_whose_systems_they_have() {
+        let grid = Grid::with_step_deg(5.0).unwrap();
+        let plane = MirrorPlane::at_deg(22.8);
+        for symmetry in [
+            Symmetry::Bilateral(plane),
+            Symmetry::HalfTurnBilateral(plane),
+        ] {
+            let settings = Settings {
+                symmetry,
+                ..Settings::DEFAULT
+            };
+            let samples = of_material(3000, false, 1.5, 0.0);
+            let fit = ScatteredFit::with_settings(&samples, settings).unwrap();
+            let (dense, _) = fit.dense(grid, false);
+            let off = |cells: &quadratic::Cells| {
+                let [lights, views] = [0, 2].map(|axis| cells.directions(axis, grid, 0));
+                let all = lights
+                    .iter()
+                    .flat_map(|l| views.iter().map(move |v| (*l, *v)));
+                let off = all.step_by(17).map(|(l, v)| {
+                    let (at, _) = fit.at(grid.direction(l), grid.direction(v));
+                    (f64::from(dense.at(l, v)[1]) / at[1]).natural_log().powi(2)
+                });
+                off.collect::<Vec<f64>>()
+            };
+            let (mut own, mut beyond) = (Vec::new(), Vec::new());
+            for pair in patches::pairs(grid, symmetry, true) {
+                if let Some(cells) = pair.beyond {
+                    own.extend(off(&pair.cells));
+                    beyond.extend(off(&cells.cells));
+                }
+            }
+            let rms = [own, beyond].map(|off| (off.iter().sum::<f64>() / off.len() as f64).sqrt());
+            assert!(rms[1] < 1.1 * rms[0], "{symmetry}: {rms:?}");
+        }
     }
 }
