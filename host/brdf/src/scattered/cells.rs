@@ -6,7 +6,7 @@ use super::local::{Local, Predicted, Work};
 use super::narrow::Narrow;
 use super::patches::{PatchPair, pairs};
 use super::places::{Near, distance2, exchanged, radius_of};
-use super::planes::{Block, Rows, planes_of, three};
+use super::planes::{Block, Rows, of_all, planes_of};
 use super::quadratic::{By, Cells, Determined, Few, Stages, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
@@ -39,20 +39,20 @@ const HALVED_AGAIN: f64 = 1.15;
 const PARTS: f64 = 4.0;
 
 /// The systems of some cells: of their places, and where data contradict reciprocity, of the reciprocal ones.
-struct Systems {
-    own: Local,
-    reciprocal: Option<Local>,
+struct Systems<const N: usize> {
+    own: Local<N>,
+    reciprocal: Option<Local<N>>,
 }
 
-impl Systems {
-    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+impl<const N: usize> Systems<N> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; N] {
         match self.reciprocal {
             None => self.own.logs_at(place, work),
             Some(_) => self.at(place, false, work).value.map(f64::natural_log),
         }
     }
 
-    fn at(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted {
+    fn at(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted<N> {
         match &self.reciprocal {
             None => self.own.at_with(place, with_error, work),
             Some(reciprocal) => super::averaged(
@@ -64,17 +64,17 @@ impl Systems {
 }
 
 /// Systems, and how near their values are needed.
-struct Solved<'a> {
-    systems: &'a Systems,
+struct Solved<'a, const N: usize> {
+    systems: &'a Systems<N>,
     /// The same in single precision, where that is near enough.
-    narrow: Option<Narrow>,
+    narrow: Option<Narrow<N>>,
     /// What logarithms may be off by.
     tolerance: f64,
 }
 
 /// Cells that share systems, and what holds for all of them.
-struct Shares<'a> {
-    solved: &'a Solved<'a>,
+struct Shares<'a, const N: usize> {
+    solved: &'a Solved<'a, N>,
     /// The pair of patches that they are of.
     pair: &'a Cells,
     cells: Cells,
@@ -84,8 +84,8 @@ struct Shares<'a> {
     errors: Vec<Vec<f64>>,
 }
 
-impl Shares<'_> {
-    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+impl<const N: usize> Shares<'_, N> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; N] {
         let place = &self.beyond.map_or(*place, |plane| plane.of(place));
         match &self.solved.narrow {
             Some(narrow) => self.solved.systems.own.logs_of(narrow.sums(place)),
@@ -111,13 +111,13 @@ struct Memory {
     blocks: [Blocks; 2],
 }
 
-struct Filler<'a> {
-    fit: &'a ScatteredFit,
+struct Filler<'a, const N: usize> {
+    fit: &'a ScatteredFit<N>,
     grid: Grid,
     channels: usize,
     with_errors: bool,
     /// The system of all data, where they are few.
-    one: Option<Systems>,
+    one: Option<Systems<N>>,
     arch: Arch,
     plane: Option<Reflection>,
     /// Sine and cosine of every quarter of a step, up to two turns.
@@ -125,27 +125,27 @@ struct Filler<'a> {
 }
 
 /// Logarithms on lines through the middle of a part.
-struct Lines {
-    middle: [f64; 3],
+struct Lines<const N: usize> {
+    middle: [f64; N],
     /// First and last along each axis, where that is longer than its nodes.
-    ends: [[[f64; 3]; 2]; 4],
+    ends: [[[f64; N]; 2]; 4],
     /// How far logarithms are from quadratic, axis by axis, up to the one with which that is too far.
     bends: [f64; 4],
     /// Whether they are near enough.
     are_quadratic: bool,
 }
 
-impl ScatteredFit {
+impl<const N: usize> ScatteredFit<N> {
     /// [`Self::dense`] of a fit that depends on all four angles.
     pub(super) fn dense_by_cells(
         &self,
         grid: Grid,
         with_errors: bool,
-    ) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
-        let is_grey = |v: &[f64; 3]| v[0] == v[1] && v[1] == v[2];
+    ) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
+        let is_grey = |v: &[f64; N]| v.iter().all(|x| *x == v[0]);
         let channels = match self.data.iter().all(|d| is_grey(&d.value)) {
             true => 1,
-            false => 3,
+            false => N,
         };
         let symmetry = self.choice.settings.symmetry;
         let turn = PARTS as usize * grid.n_phi();
@@ -193,8 +193,8 @@ impl ScatteredFit {
                     blocks.errors.store(&cells, grid, &rows_of_errors);
                 }
             });
-        let errors = with_errors.then(|| three(grid, errors));
-        (DenseBrdf::from_planes(grid, three(grid, values)), errors)
+        let errors = with_errors.then(|| of_all(grid, errors));
+        (DenseBrdf::from_planes(grid, of_all(grid, values)), errors)
     }
 }
 
@@ -229,7 +229,7 @@ impl Neighbourhood {
     }
 }
 
-impl Filler<'_> {
+impl<const N: usize> Filler<'_, N> {
     fn place(&self, [i, phi_i, v, phi_v]: [f64; 4]) -> Pair {
         let of = |x: f64| self.angles[(PARTS * x).round() as usize];
         let direction = |theta: f64, phi: f64| {
@@ -249,7 +249,7 @@ impl Filler<'_> {
         }
     }
 
-    fn systems(&self, near: &Neighbourhood) -> Option<Systems> {
+    fn systems(&self, near: &Neighbourhood) -> Option<Systems<N>> {
         let system = |near: &Vec<Near>| Local::fit(&self.fit.data, near, &self.fit.choice.settings);
         Some(Systems {
             own: system(&near.own)?,
@@ -331,7 +331,7 @@ impl Filler<'_> {
     /// systems that they share.
     fn share(
         &self,
-        systems: &Systems,
+        systems: &Systems<N>,
         pair: &PatchPair,
         (cells, reach): (Cells, f64),
         memory: &mut Memory,
@@ -377,13 +377,13 @@ impl Filler<'_> {
 
     /// Logarithms of relative standard errors at all nodes of cells, channel by channel. Between the few that are computed
     /// they stay within these.
-    fn errors(&self, systems: &Systems, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    fn errors(&self, systems: &Systems<N>, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
+        let (mut low, mut high) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
         let mut logs = |place: Pair| {
             let relative = systems.at(&place, true, work).relative;
             let logs = relative.map(|r| (self.fit.choice.error_factor * r).natural_log());
-            low = [0, 1, 2].map(|c| low[c].min(logs[c]));
-            high = [0, 1, 2].map(|c| high[c].max(logs[c]));
+            low = std::array::from_fn(|c| low[c].min(logs[c]));
+            high = std::array::from_fn(|c| high[c].max(logs[c]));
             logs
         };
         let mut nodes = if (0..4).all(|axis| cells.length(axis) > 2) {
@@ -424,7 +424,7 @@ impl Filler<'_> {
     }
 
     /// Fills a part of cells that share systems: between its nodes where that is near enough.
-    fn refine(&self, shares: &Shares<'_>, part: Cells, memory: &mut Memory) {
+    fn refine(&self, shares: &Shares<'_, N>, part: Cells, memory: &mut Memory) {
         if part.count() <= DIRECT {
             let mut channels = vec![Vec::new(); self.channels];
             let [lights, views] = [0, 2].map(|axis| part.directions(axis, self.grid, 0));
@@ -476,9 +476,9 @@ impl Filler<'_> {
     /// What determines the logarithms of a part, channel by channel.
     fn nodes(
         &self,
-        shares: &Shares<'_>,
+        shares: &Shares<'_, N>,
         part: &Cells,
-        lines: &Lines,
+        lines: &Lines<N>,
         work: &mut Work,
     ) -> (By, Vec<Vec<f64>>) {
         let mut logs = |place: Pair| shares.logs_at(&place, work);
@@ -496,10 +496,10 @@ impl Filler<'_> {
     fn few_nodes(
         &self,
         cells: &Cells,
-        (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
-        at: &mut impl FnMut(Pair) -> [f64; 3],
+        (middle, ends): ([f64; N], [[[f64; N]; 2]; 4]),
+        at: &mut impl FnMut(Pair) -> [f64; N],
     ) -> Vec<Few> {
-        let corners: [[f64; 3]; 16] =
+        let corners: [[f64; N]; 16] =
             std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
         let few = |c: usize| Few {
             middle: middle[c],
@@ -510,7 +510,7 @@ impl Filler<'_> {
     }
 
     /// Values at all nodes of cells, each computed.
-    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; 3]) -> Vec<Vec<f64>> {
+    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; N]) -> Vec<Vec<f64>> {
         let mut nodes = vec![Vec::new(); self.channels];
         self.each_node(cells, |place| {
             for (nodes, value) in nodes.iter_mut().zip(at(place)) {
@@ -520,7 +520,7 @@ impl Filler<'_> {
         nodes
     }
 
-    fn lines(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> Lines {
+    fn lines(&self, shares: &Shares<'_, N>, part: &Cells, work: &mut Work) -> Lines<N> {
         let mut logs = |at: [f64; 4]| shares.logs_at(&self.place(at), work);
         let at = part.middle();
         let middle = logs(at);
@@ -562,7 +562,7 @@ impl Filler<'_> {
     /// Whether the nodes of a part determine its values aside of the middles, too.
     fn meets_between(
         &self,
-        shares: &Shares<'_>,
+        shares: &Shares<'_, N>,
         part: &Cells,
         (by, channels): (By, &[Vec<f64>]),
         work: &mut Work,
@@ -589,7 +589,13 @@ impl Filler<'_> {
         })
     }
 
-    fn store(&self, shares: &Shares<'_>, part: Cells, channels: &[Vec<f64>], memory: &mut Memory) {
+    fn store(
+        &self,
+        shares: &Shares<'_, N>,
+        part: Cells,
+        channels: &[Vec<f64>],
+        memory: &mut Memory,
+    ) {
         for (c, values) in channels.iter().enumerate() {
             let blocks = &mut memory.blocks[usize::from(shares.beyond.is_some())];
             blocks.values.put(shares.pair, &part, c, values);

@@ -185,12 +185,15 @@ enum Response {
     Linear,
 }
 
+/// So many channels are colours.
+const COLOURS: usize = 3;
 /// The signal is within the noise where the median is less than this many times the most negative value.
 const WITHIN_NOISE: f64 = 4.0;
 
 impl Response {
-    fn of(here: &[&Datum]) -> Self {
-        let within_noise = (0..3).any(|c| {
+    /// Of each channel. Colours are of one kind; of bands one may be dark where others are not.
+    fn of<const N: usize>(here: &[&Datum<N>]) -> [Self; N] {
+        let within_noise = |c: usize| {
             let values = here.iter().map(|d| d.value[c]);
             let lowest = values.clone().fold(f64::INFINITY, f64::min);
             // Without a negative one nothing needs sorting.
@@ -199,20 +202,21 @@ impl Response {
                 values.sort_by(f64::total_cmp);
                 values[values.len() / 2] < -WITHIN_NOISE * lowest
             }
-        });
-        if within_noise {
-            Response::Linear
-        } else {
-            Response::Logarithm
-        }
+        };
+        let within: [bool; N] = std::array::from_fn(within_noise);
+        let any = N <= COLOURS && within.contains(&true);
+        within.map(|within| match within || any {
+            true => Response::Linear,
+            false => Response::Logarithm,
+        })
     }
 }
 
 /// A BRDF fitted to few samples, to be evaluated anywhere.
-pub struct ScatteredFit {
+pub struct ScatteredFit<const N: usize = 3> {
     /// Places with a sample.
     measured: usize,
-    data: Vec<Datum>,
+    data: Vec<Datum<N>>,
     places: Places,
     choice: Choice,
 }
@@ -259,8 +263,10 @@ impl ScatteredFit {
         let data = Data::new(samples);
         (data.places.len() >= PLACES_MIN).then(|| Self::chosen(&data, Choice::of(settings)))
     }
+}
 
-    fn chosen(data: &Data, choice: Choice) -> Self {
+impl<const N: usize> ScatteredFit<N> {
+    fn chosen(data: &Data<N>, choice: Choice) -> Self {
         let merged = Merged::new(data, &choice.settings).data;
         Self {
             measured: data.places.len(),
@@ -270,10 +276,11 @@ impl ScatteredFit {
         }
     }
 
-    /// The same fit of other channels of these samples.
+    /// The same fit of other channels of these samples, which share what does not depend on values: neighbourhoods,
+    /// covariances and their factors.
     #[must_use]
-    pub fn of_channels(&self, samples: &[Sample]) -> Self {
-        Self::chosen(&Data::new(samples), self.choice.clone())
+    pub fn of_channels<const M: usize>(&self, samples: &[Sample<M>]) -> ScatteredFit<M> {
+        ScatteredFit::chosen(&Data::new(samples), self.choice.clone())
     }
 
     /// The settings, and why these.
@@ -287,22 +294,22 @@ impl ScatteredFit {
     }
 
     /// The value at a pair of directions per channel, positive and reciprocal, and its standard error.
-    pub fn at(&self, light: Direction, view: Direction) -> ([f64; 3], [f64; 3]) {
+    pub fn at(&self, light: Direction, view: Direction) -> ([f64; N], [f64; N]) {
         let predicted = self.predicted(light.to_vec3(), view.to_vec3());
         let factor = self.choice.error_factor;
-        let error = [0, 1, 2].map(|c| factor * predicted.relative[c] * predicted.value[c]);
+        let error = std::array::from_fn(|c| factor * predicted.relative[c] * predicted.value[c]);
         (predicted.value, error)
     }
 
     /// [`Self::at`] many pairs of light and view, by all threads.
-    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<([f64; 3], [f64; 3])> {
+    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<([f64; N], [f64; N])> {
         let at = |(light, view): &(Direction, Direction)| self.at(*light, *view);
         pairs.par_iter().map(at).collect()
     }
 
     /// The values of all cells of a grid and their standard errors per channel. Positive, finite, exactly
     /// reciprocal, one value a pole.
-    pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
+    pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
         if self.choice.settings.symmetry.is_isotropic() {
             self.dense_by_table(grid, with_errors)
         } else {
@@ -310,7 +317,7 @@ impl ScatteredFit {
         }
     }
 
-    fn predicted(&self, light: Vec3, view: Vec3) -> Predicted {
+    fn predicted(&self, light: Vec3, view: Vec3) -> Predicted<N> {
         let settings = &self.choice.settings;
         let place = settings.coordinates.pair(light, view);
         let here = self.predicted_at(place);
@@ -320,7 +327,7 @@ impl ScatteredFit {
         preferred(&here, &self.predicted_at(exchanged(place)))
     }
 
-    fn predicted_at(&self, place: Pair) -> Predicted {
+    fn predicted_at(&self, place: Pair) -> Predicted<N> {
         let settings = &self.choice.settings;
         let near = self
             .places
@@ -331,8 +338,8 @@ impl ScatteredFit {
 
 /// A place's own prediction where data lie near it, and that of the reciprocal place where they lie nearer
 /// to that one: what data say that contradict reciprocity.
-fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
-    let variance = |p: &Predicted| p.relative.iter().map(|r| r * r).sum::<f64>().max(1e-30);
+fn preferred<const N: usize>(own: &Predicted<N>, reciprocal: &Predicted<N>) -> Predicted<N> {
+    let variance = |p: &Predicted<N>| p.relative.iter().map(|r| r * r).sum::<f64>().max(1e-30);
     let ratio = (variance(own) / (NEARER * variance(reciprocal))).powi(4);
     let share = if ratio.is_finite() {
         ratio / (1.0 + ratio)
@@ -340,7 +347,7 @@ fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
         1.0
     };
     let mut mean = *own;
-    for c in 0..3 {
+    for c in 0..N {
         let logs = [own, reciprocal].map(|p| p.value[c].natural_log());
         mean.value[c] = ((1.0 - share) * logs[0] + share * logs[1]).exponential();
         mean.relative[c] =
@@ -353,9 +360,9 @@ fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
 const NEARER: f64 = 4.0;
 
 /// The mean of two of one value, weighted by their certainty.
-fn averaged(a: &Predicted, b: &Predicted) -> Predicted {
+fn averaged<const N: usize>(a: &Predicted<N>, b: &Predicted<N>) -> Predicted<N> {
     let mut mean = *a;
-    for c in 0..3 {
+    for c in 0..N {
         let [wa, wb] = [a, b].map(|p| 1.0 / p.relative[c].powi(2).max(1e-18));
         let share = wb / (wa + wb);
         let log = (1.0 - share) * a.value[c].natural_log() + share * b.value[c].natural_log();

@@ -33,17 +33,18 @@ pub(super) fn planes_of(grid: Grid, channels: usize) -> Vec<Vec<f32>> {
     (0..channels).map(|_| vec![0.0; grid.n_cells()]).collect()
 }
 
-/// All three planes: of one channel, that one in each. A pole's value at azimuth 0 becomes that at all azimuths.
-pub(super) fn three(grid: Grid, mut planes: Vec<Vec<f32>>) -> [Vec<f32>; 3] {
+/// The planes of all channels: of one that stands for all, that one in each. A pole's value at azimuth 0 becomes that at
+/// all azimuths.
+pub(super) fn of_all<const N: usize>(grid: Grid, mut planes: Vec<Vec<f32>>) -> [Vec<f32>; N] {
     for plane in &mut planes {
         spread_poles(grid, plane);
     }
-    let mut planes = planes.into_iter();
-    let first = planes.next().unwrap_or_default();
-    match (planes.next(), planes.next()) {
-        (Some(second), Some(third)) => [first, second, third],
-        _ => [first.clone(), first.clone(), first],
+    planes.resize_with(planes.len().max(1), Vec::new);
+    while planes.len() < N {
+        planes.push(planes[0].clone());
     }
+    let mut planes = planes.into_iter();
+    std::array::from_fn(|_| planes.next().unwrap_or_default())
 }
 
 /// Directions that follow each other: from which number in the patch, the number of the first, and how many.
