@@ -14,9 +14,11 @@ use crate::direction::Direction;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
+use crate::interpolate::planes::spread_poles;
 use crate::symmetry::{MirrorPlane, Reflection};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
 const SHARED: f64 = 1.0;
@@ -142,11 +144,21 @@ impl<const N: usize> ScatteredFit<N> {
         grid: Grid,
         with_errors: bool,
     ) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
-        let is_grey = |v: &[f64; N]| v.iter().all(|x| *x == v[0]);
-        let channels = match self.data.iter().all(|d| is_grey(&d.value)) {
-            true => 1,
-            false => N,
-        };
+        let all = 0..grid.n_theta();
+        let (values, errors) = self.planes_by_cells(grid, all, with_errors);
+        let dense = DenseBrdf::from_planes(grid, of_all(values));
+        (dense, with_errors.then(|| of_all(errors)))
+    }
+
+    /// Values of cells of lights on some rings, a plane a channel, or one for all channels that are alike; and their
+    /// standard errors.
+    pub(super) fn planes_by_cells(
+        &self,
+        grid: Grid,
+        rings: Range<usize>,
+        with_errors: bool,
+    ) -> (Vec<Vec<f32>>, Vec<Vec<f32>>) {
+        let channels = self.channels();
         let symmetry = self.choice.settings.symmetry;
         let turn = PARTS as usize * grid.n_phi();
         let mut filler = Filler {
@@ -171,15 +183,22 @@ impl<const N: usize> ScatteredFit<N> {
             let near = filler.near(place, self.places.images());
             filler.one = filler.systems(&near);
         }
-        let mut values = planes_of(grid, channels);
+        let mut values = planes_of(grid, rings.len(), channels);
         let errors_of = if with_errors { channels } else { 0 };
-        let mut errors = planes_of(grid, errors_of);
-        let rows = Rows::of(grid, &mut values);
-        let rows_of_errors = Rows::of(grid, &mut errors);
+        let mut errors = planes_of(grid, rings.len(), errors_of);
+        let rows = Rows::of(grid, rings.start, &mut values);
+        let rows_of_errors = Rows::of(grid, rings.start, &mut errors);
+        let is_wanted = |pair: &PatchPair| {
+            let cells = &pair.cells;
+            [0, 2]
+                .iter()
+                .any(|axis| cells.start[*axis] < rings.end && rings.start < cells.end[*axis])
+        };
         // What shares one system anyway need not lie side by side.
         pairs(grid, symmetry, filler.one.is_none())
             .par_iter()
             .with_max_len(8)
+            .filter(|pair| is_wanted(pair))
             .for_each_init(Memory::default, |memory, pair| {
                 let beyond = pair.beyond.map(|beyond| beyond.cells);
                 let both = || std::iter::once(pair.cells).chain(beyond);
@@ -193,8 +212,10 @@ impl<const N: usize> ScatteredFit<N> {
                     blocks.errors.store(&cells, grid, &rows_of_errors);
                 }
             });
-        let errors = with_errors.then(|| of_all(grid, errors));
-        (DenseBrdf::from_planes(grid, of_all(grid, values)), errors)
+        for plane in values.iter_mut().chain(&mut errors) {
+            spread_poles(grid, rings.start == 0, plane);
+        }
+        (values, errors)
     }
 }
 

@@ -88,7 +88,7 @@ fn places<const N: usize>(samples: &[Sample<N>]) -> Vec<Datum<N>> {
 }
 
 /// How many places samples have.
-pub(super) fn count_places(samples: &[Sample]) -> usize {
+pub(super) fn count_places<const N: usize>(samples: &[Sample<N>]) -> usize {
     places(samples).len()
 }
 

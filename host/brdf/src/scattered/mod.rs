@@ -42,12 +42,11 @@ use local::{Local, Predicted};
 use merge::Merged;
 use places::{Places, exchanged};
 use rayon::prelude::*;
+use std::ops::Range;
+use table::Table;
 
 /// More places than this are not few.
 pub const FEW: usize = 100_000;
-/// Above this many places of more than three channels an anisotropic material is interpolated block by block: 31 channels
-/// share a factorisation there.
-pub const FEW_OF_BANDS: usize = 20_000;
 /// Fewer places than this say nothing.
 pub const PLACES_MIN: usize = 8;
 /// Frames that hold more places than this, on average, are images of many samples.
@@ -222,12 +221,12 @@ pub struct ScatteredFit<const N: usize = 3> {
 }
 
 /// Whether samples are few, and scattered: not the images of a camera, which see many directions at once.
-pub fn is_few(samples: &[Sample]) -> bool {
+pub fn is_few<const N: usize>(samples: &[Sample<N>]) -> bool {
     samples.len() <= 8 * FEW && !are_images(samples) && data::count_places(samples) <= FEW
 }
 
 /// Whether samples are the images of a camera, by their frames' numbers: more than a few samples a frame.
-pub fn are_images(samples: &[Sample]) -> bool {
+pub fn are_images<const N: usize>(samples: &[Sample<N>]) -> bool {
     let mut frames: Vec<u32> = samples.iter().map(|s| s.frame).collect();
     frames.retain(|frame| *frame != Sample::NO_FRAME);
     let framed = frames.len();
@@ -314,6 +313,39 @@ impl<const N: usize> ScatteredFit<N> {
             self.dense_by_table(grid, with_errors)
         } else {
             self.dense_by_cells(grid, with_errors)
+        }
+    }
+
+    /// The values of [`Self::dense`] of so many rings of lights (of one polar angle) at a time, or more where one is too
+    /// few: `take` gets the rings and the cells of their lights, a plane a channel, or one plane for all channels that are
+    /// alike.
+    ///
+    /// # Errors
+    /// What `take` returns.
+    pub fn by_rings<E>(
+        &self,
+        grid: Grid,
+        at_a_time: usize,
+        mut take: impl FnMut(Range<usize>, &[Vec<f32>]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let is_isotropic = self.choice.settings.symmetry.is_isotropic();
+        let table = is_isotropic.then(|| Table::new(self, grid, false));
+        for rings in patches::bands(grid, at_a_time) {
+            let planes = match &table {
+                Some(table) => table.spread(rings.clone(), self.channels(), |p, c| p.value[c]),
+                None => self.planes_by_cells(grid, rings.clone(), false).0,
+            };
+            take(rings, &planes)?;
+        }
+        Ok(())
+    }
+
+    /// How many channels differ: one where all are alike.
+    fn channels(&self) -> usize {
+        let is_grey = |v: &[f64; N]| v.iter().all(|x| *x == v[0]);
+        match self.data.iter().all(|d| is_grey(&d.value)) {
+            true => 1,
+            false => N,
         }
     }
 

@@ -5,6 +5,7 @@ use super::quadratic::Cells;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::symmetry::{MirrorPlane, Symmetry};
+use std::ops::Range;
 
 /// Side of the patches of directions that the work begins with, degrees.
 const PATCH_DEG: f64 = 16.0;
@@ -62,6 +63,28 @@ pub(super) fn pairs(grid: Grid, symmetry: Symmetry, side_by_side: bool) -> Vec<P
         }
     }
     pairs
+}
+
+/// Rings of lights whose cells are filled together, so many at most: whole rings of patches as far as that is possible, so
+/// that few pairs of patches are filled twice.
+pub(super) fn bands(grid: Grid, at_most: usize) -> Vec<Range<usize>> {
+    let at_most = at_most.max(1);
+    let mut bands: Vec<Range<usize>> = Vec::new();
+    for ring in rings(grid) {
+        let [[mut first, _], [end, _]] = ring[0];
+        if let Some(last) = bands.last_mut() {
+            if end - last.start <= at_most {
+                last.end = end;
+                continue;
+            }
+        }
+        while first < end {
+            let next = end.min(first + at_most);
+            bands.push(first..next);
+            first = next;
+        }
+    }
+    bands
 }
 
 fn in_order(p: usize, q: usize) -> (usize, usize) {

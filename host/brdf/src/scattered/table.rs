@@ -3,12 +3,14 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted};
 use super::places::{distance2, radius_of};
+use super::planes::{of_all, planes_of};
 use crate::dense::DenseBrdf;
 use crate::direction::Direction;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
 use crate::symmetry::Symmetry;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
 const SHARED: f64 = 0.5;
@@ -25,7 +27,7 @@ struct Part {
 }
 
 /// Values of an isotropic BRDF by polar angles and the difference of azimuths.
-struct Table<const N: usize> {
+pub(super) struct Table<const N: usize> {
     grid: Grid,
     cells: Vec<Predicted<N>>,
 }
@@ -40,14 +42,16 @@ impl<const N: usize> ScatteredFit<N> {
     ) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
         let table = Table::new(self, grid, with_errors);
         let factor = self.choice.error_factor;
-        let values = table.spread(|p, c| p.value[c]);
-        let errors = with_errors.then(|| table.spread(|p, c| factor * p.relative[c] * p.value[c]));
-        (DenseBrdf::from_planes(grid, values), errors)
+        let (all, channels) = (0..grid.n_theta(), self.channels());
+        let values = table.spread(all.clone(), channels, |p, c| p.value[c]);
+        let error = |p: &Predicted<N>, c: usize| factor * p.relative[c] * p.value[c];
+        let errors = with_errors.then(|| of_all(table.spread(all, channels, error)));
+        (DenseBrdf::from_planes(grid, of_all(values)), errors)
     }
 }
 
 impl<const N: usize> Table<N> {
-    fn new(fit: &ScatteredFit<N>, grid: Grid, with_errors: bool) -> Self {
+    pub fn new(fit: &ScatteredFit<N>, grid: Grid, with_errors: bool) -> Self {
         let size = [grid.n_theta(), grid.n_theta(), grid.n_phi()];
         // Where both sides of the plane of incidence are alike, one is fitted.
         let is_mirrored = fit.choice.settings.symmetry == Symmetry::Isotropic;
@@ -126,17 +130,23 @@ impl<const N: usize> Table<N> {
         self
     }
 
-    fn spread(&self, of: impl Fn(&Predicted<N>, usize) -> f64 + Sync) -> [Vec<f32>; N] {
+    /// What is `of` the cells of so many channels, of lights on some rings, a plane a channel.
+    pub fn spread(
+        &self,
+        rings: Range<usize>,
+        channels: usize,
+        of: impl Fn(&Predicted<N>, usize) -> f64 + Sync,
+    ) -> Vec<Vec<f32>> {
         let (grid, n_phi) = (self.grid, self.grid.n_phi());
         let n = grid.n_directions();
-        let mut planes = [(); N].map(|()| vec![0f32; grid.n_cells()]);
+        let mut planes = planes_of(grid, rings.len(), channels);
         for (c, plane) in planes.iter_mut().enumerate() {
             let narrow: Vec<f32> = self.cells.iter().map(|p| of(p, c) as f32).collect();
             plane
                 .par_chunks_mut(n)
                 .enumerate()
                 .for_each(|(light, row)| {
-                    let (i, phi_i) = (light / n_phi, light % n_phi);
+                    let (i, phi_i) = (rings.start + light / n_phi, light % n_phi);
                     for (v, ring) in row.chunks_mut(n_phi).enumerate() {
                         let start = Self::cell(grid, [i, v, 0]);
                         let cells = &narrow[start..start + n_phi];
