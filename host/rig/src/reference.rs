@@ -1,7 +1,11 @@
 //! `[reference]` of `rig.toml`: what a reference reflects, and how well that is known.
 
 use gonia_brdf::Pose;
-use serde::{Deserialize, Serialize};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt::{self, Formatter};
+use toml_datetime::Datetime;
 
 /// A reference of known reflectance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,11 +74,33 @@ pub enum ReflectanceTable {
     ByPose(Vec<(Pose, [f64; 3])>),
 }
 
+/// A reflectance that all channels share, or one for each.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "reflectance: give one number, or three of them as [red, green, blue]"
+)]
+enum OneOrThree {
+    One(f64),
+    Three([f64; 3]),
+}
+
+fn one_or_three<'de, D: Deserializer<'de>>(of: D) -> Result<Option<[f64; 3]>, D::Error> {
+    OneOrThree::deserialize(of).map(|read| match read {
+        OneOrThree::One(rho) => Some([rho; 3]),
+        OneOrThree::Three(rho) => Some(rho),
+    })
+}
+
 /// The keys of `[reference]`.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ReferenceKeys {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "one_or_three",
+        skip_serializing_if = "Option::is_none"
+    )]
     reflectance: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     table: Option<String>,
@@ -88,8 +114,37 @@ struct ReferenceKeys {
     height_u_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     certificate: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "day"
+    )]
     valid_until: Option<String>,
+}
+
+/// A day as a text or as TOML's own date, without quotes. Whether it is one is checked with the rest of the rig.
+fn day<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    struct Day;
+
+    impl<'de> Visitor<'de> for Day {
+        type Value = String;
+
+        fn expecting(&self, f: &mut Formatter<'_>) -> fmt::Result {
+            f.write_str("a day, as 2027-03-31")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<String, E> {
+            Ok(text.into())
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<String, A::Error> {
+            let date = Datetime::deserialize(MapAccessDeserializer::new(map));
+            date.map(|date| date.to_string())
+                .map_err(|_| serde::de::Error::invalid_type(Unexpected::Map, &self))
+        }
+    }
+
+    from.deserialize_any(Day).map(Some)
 }
 
 impl TryFrom<ReferenceKeys> for Reference {
@@ -142,5 +197,39 @@ impl From<Reference> for ReferenceKeys {
             certificate,
             valid_until,
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn read(day: &str) -> Result<Option<String>, String> {
+        let text = format!("reflectance = [0.9, 0.9, 0.9]\nvalid_until = {day}\n");
+        let read: Result<Reference, _> = toml::from_str(&text);
+        read.map(|of| of.certificate.valid_until)
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_day_may_stand_with_quotes_or_without() {
+        for day in ["2026-01-01", "\"2026-01-01\""] {
+            assert_eq!(read(day).unwrap().as_deref(), Some("2026-01-01"), "{day}");
+        }
+        // No day, which the check of the whole rig says.
+        assert_eq!(read("07:32:00").unwrap().as_deref(), Some("07:32:00"));
+        for other in ["2026", "{ year = 2026 }"] {
+            let error = read(other).unwrap_err();
+            assert!(error.contains("expected a day, as 2027-03-31"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let mut reference = Reference::lambertian([0.9; 3]);
+        reference.certificate.valid_until = Some("2026-01-01".into());
+        let text = toml::to_string(&reference).unwrap();
+        assert_eq!(toml::from_str::<Reference>(&text).unwrap(), reference);
     }
 }

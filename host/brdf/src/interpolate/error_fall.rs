@@ -57,10 +57,7 @@ impl ErrorFall {
         }
         let exponent = |is_in: &dyn Fn(bool) -> bool| {
             let pairs = whole.iter().zip(&half);
-            let of_part = pairs.filter(|(of, _)| {
-                let (grazing, _) = calibration.place_of(of);
-                is_in(grazing)
-            });
+            let of_part = pairs.filter(|(of, _)| is_in(Calibration::is_grazing(of)));
             let (whole, half): (Vec<_>, Vec<_>) = of_part.unzip();
             if whole.len() < TESTS_MIN {
                 return None;

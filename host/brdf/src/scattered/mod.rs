@@ -835,4 +835,74 @@ mod tests {
             assert!(rms[1] < 1.1 * rms[0], "{symmetry}: {rms:?}");
         }
     }
+
+    /// The samples with other channels: each so many times the red one.
+    fn of_times<const N: usize>(samples: &[Sample], times: [f32; N]) -> Vec<Sample<N>> {
+        let with = |s: &Sample| s.with_values(times.map(|times| times * s.rgb[0]));
+        samples.iter().map(with).collect()
+    }
+
+    fn settings_of(symmetry: Symmetry) -> Settings {
+        Settings {
+            symmetry,
+            ..Settings::DEFAULT
+        }
+    }
+
+    #[test]
+    fn bands_of_one_factorisation_are_each_what_it_is_among_colours() {
+        let samples = of_material(300, false, 1.5, 0.0);
+        let fit = ScatteredFit::with_settings(&samples, settings_of(Symmetry::None)).unwrap();
+        let times = [1.0, 0.5, 2.0, 3.0, 0.7];
+        let bands = fit.of_channels(&of_times(&samples, times));
+        let colours = fit.of_channels(&of_times(&samples, [3.0, 0.7, 1.0]));
+        // One that is noise about zero leaves the others what they are.
+        let mut random = Random::new(6);
+        let mut dark = of_times(&samples, times);
+        for sample in &mut dark {
+            sample.rgb[1] = 1e-4 * random.normal() as f32;
+        }
+        let with_dark = fit.of_channels(&dark);
+        for _ in 0..20 {
+            let (light, view) = (direction(&mut random, false), direction(&mut random, false));
+            let (found, known) = (bands.at(light, view), colours.at(light, view));
+            for (band, colour) in [(3, 0), (4, 1), (0, 2)] {
+                assert!((found.0[band] / known.0[colour] - 1.0).abs() < 1e-12);
+                assert!((found.1[band] / known.1[colour] - 1.0).abs() < 1e-9);
+            }
+            let (beside_dark, _) = with_dark.at(light, view);
+            for band in [0, 2, 3, 4] {
+                assert!((beside_dark[band] / found.0[band] - 1.0).abs() < 1e-12);
+            }
+            assert!(beside_dark[1] > 0.0 && beside_dark[1] < 1e-3);
+        }
+    }
+
+    #[test]
+    fn cells_ring_by_ring_are_those_of_all_at_once() {
+        let grid = Grid::with_step_deg(5.0).unwrap();
+        let samples = of_material(400, false, 1.5, 0.0);
+        let samples = of_times(&samples, [1.0, 0.5, 2.0]);
+        let plane = MirrorPlane::at_deg(22.8);
+        for symmetry in [
+            Symmetry::None,
+            Symmetry::HalfTurnBilateral(plane),
+            Symmetry::Isotropic,
+        ] {
+            let fit = ScatteredFit::with_settings(&samples, settings_of(symmetry)).unwrap();
+            let (dense, _) = fit.dense(grid, false);
+            for at_a_time in [1, 5, 100] {
+                let mut planes = vec![Vec::new(); 3];
+                let taken = fit.by_rings(grid, at_a_time, |rings, some| {
+                    assert!(rings.len() <= at_a_time);
+                    for (plane, some) in planes.iter_mut().zip(some) {
+                        plane.extend_from_slice(some);
+                    }
+                    Ok::<(), ()>(())
+                });
+                assert_eq!(taken, Ok(()));
+                assert!(planes == dense.planes(), "{symmetry} {at_a_time}");
+            }
+        }
+    }
 }

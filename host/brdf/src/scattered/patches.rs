@@ -72,11 +72,11 @@ pub(super) fn bands(grid: Grid, at_most: usize) -> Vec<Range<usize>> {
     let mut bands: Vec<Range<usize>> = Vec::new();
     for ring in rings(grid) {
         let [[mut first, _], [end, _]] = ring[0];
-        if let Some(last) = bands.last_mut() {
-            if end - last.start <= at_most {
-                last.end = end;
-                continue;
-            }
+        if let Some(last) = bands.last_mut()
+            && end - last.start <= at_most
+        {
+            last.end = end;
+            continue;
         }
         while first < end {
             let next = end.min(first + at_most);

@@ -31,15 +31,27 @@ use std::sync::Arc;
 const STEP_DEG: f64 = 6.0;
 const POSES: usize = 60;
 
+/// Which session: the seed of its material, its number, and how many poses it has.
+#[derive(Clone, Copy)]
+struct Of {
+    seed: u64,
+    number: u64,
+    poses: usize,
+}
+
 /// A session from its frames to its cells: its errors are drawn for the inputs that have any, and its budget holds these.
 fn run(
     material: &Arc<dyn Brdf>,
-    (seed, poses): (u64, usize),
+    Of {
+        seed,
+        number,
+        poses,
+    }: Of,
     has: &dyn Fn(Input) -> bool,
 ) -> (Filled, Budget, Errors) {
     let rig = nominal(1.0);
-    let errors = Errors::draw(seed, 1.0, has);
-    let session = Session::new(&rig, material.clone(), errors, (seed, poses));
+    let errors = Errors::draw((seed, number), has);
+    let session = Session::new(&rig, material.clone(), errors, (seed + number, poses));
     let go = &|_, _| ControlFlow::Continue(());
     let mut done = process(&rig, &session, &Masks::default(), go).expect("frames are sound");
     with_directions_off(&mut done.samples, &session.errors);
@@ -58,11 +70,7 @@ fn run(
     (filled, budget, session.errors)
 }
 
-fn counted(
-    material: &Arc<dyn Brdf>,
-    of: (u64, usize),
-    has: &dyn Fn(Input) -> bool,
-) -> (Counts, Inputs) {
+fn counted(material: &Arc<dyn Brdf>, of: Of, has: &dyn Fn(Input) -> bool) -> (Counts, Inputs) {
     let (filled, budget, drawn) = run(material, of, has);
     let errors = filled.errors.as_ref().expect("asked for");
     let (grid, plane) = (filled.dense.grid, &filled.dense.planes[1]);
@@ -118,7 +126,11 @@ impl OfMaterial {
         let counted: Vec<(bool, (Counts, Inputs))> = both
             .into_par_iter()
             .map(|(number, all)| {
-                let of = (self.seed + number, poses);
+                let of = Of {
+                    seed: self.seed,
+                    number,
+                    poses,
+                };
                 (all, counted(&self.material, of, &|_| all))
             })
             .collect();

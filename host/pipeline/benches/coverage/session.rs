@@ -62,20 +62,38 @@ pub struct Errors {
     drawn: [[f64; 2]; Input::ALL.len()],
 }
 
+/// Of so many sessions one after the other each error has one value in each of so many equal shares of its distribution, in
+/// an order of its own (a Latin hypercube): else a few sessions would tell of the luck of their draws.
+#[allow(dead_code)] // The test of each error alone draws none.
+const STRATA: usize = 40;
+/// Normal numbers that a stratum is one of, at random.
+#[allow(dead_code)]
+const OF_STRATUM: usize = 64;
+
 impl Errors {
-    /// Drawn for the inputs that have any.
+    /// Drawn for the inputs that have any: those of the session of this number, of the sessions of one seed.
     #[allow(dead_code)] // The test of each error alone draws none.
-    pub fn draw(seed: u64, scale: f64, has: &dyn Fn(Input) -> bool) -> Self {
-        let mut random = Random::new(seed);
+    pub fn draw((seed, number): (u64, u64), has: &dyn Fn(Input) -> bool) -> Self {
+        let [round, place] = [number / STRATA as u64, number % STRATA as u64];
+        let mut component = 0;
+        let mut one = || {
+            component += 1;
+            let mut random = Random::new(seed ^ (round << 32) ^ (component << 48));
+            let mut normal: Vec<f64> = (0..STRATA * OF_STRATUM).map(|_| random.normal()).collect();
+            normal.sort_by(f64::total_cmp);
+            let mut order: Vec<usize> = (0..STRATA).collect();
+            for k in (1..STRATA).rev() {
+                order.swap(k, (random.share() * (k + 1) as f64) as usize);
+            }
+            let within: Vec<usize> = (0..STRATA)
+                .map(|_| (random.share() * OF_STRATUM as f64) as usize)
+                .collect();
+            let place = place as usize;
+            normal[order[place] * OF_STRATUM + within[place]]
+        };
         let drawn = Input::ALL.map(|input| {
-            let by = [random.normal(), random.normal()];
-            by.map(|by| {
-                if has(input) {
-                    by * scale * stated(input)
-                } else {
-                    0.0
-                }
-            })
+            let by = [one(), one()];
+            by.map(|by| if has(input) { by * stated(input) } else { 0.0 })
         });
         Self { drawn }
     }

@@ -50,6 +50,7 @@ pub(crate) use poses::fall_fact;
 pub use poses::{fall_in, with_poses};
 pub use record::budget_in;
 pub use samples::scale_uncertainty;
+pub(crate) use sides::SidesOfSamples;
 pub use summary::{
     CellBudget, Holding, Shares, StratumBudget, coverage, not_stated, stated, summary,
 };

@@ -3,13 +3,48 @@
 use crate::budget::patches::Patches;
 use gonia_brdf::direction::{Vec3, dot, normalize};
 use gonia_brdf::interpolate::Origin;
-use gonia_brdf::{Elementary, Grid};
+use gonia_brdf::{Direction, Elementary, Grid};
 
 /// Directions of a patch, about so wide, have samples about them in the same proportion.
 const PATCH_DEG: f64 = 10.0;
 /// Samples count by Gaussians of these widths over the distance, each of the same mass: about by its fourth power, as the
 /// nearest count most where values are interpolated.
 const REACHES_DEG: [f64; 4] = [5.0, 10.0, 20.0, 40.0];
+
+/// Directions of samples without a table are those of the nearest nodes of a grid of this step.
+const STEP_DEG: f64 = 6.0;
+
+/// Which samples lie where, of a fit that has no table.
+pub(crate) struct SidesOfSamples {
+    grid: Grid,
+    sides: Sides,
+}
+
+impl SidesOfSamples {
+    /// Of the directions of light and view of samples that no symmetry is taken for.
+    pub fn of(samples: impl Iterator<Item = (Direction, Direction)>) -> Option<Self> {
+        let grid = Grid::with_step_deg(STEP_DEG).ok()?;
+        let mut origins = vec![Origin::Interpolated as u8; grid.n_cells()];
+        for (light, view) in samples {
+            origins[grid.cell(node(grid, light), node(grid, view))] = Origin::Measured as u8;
+        }
+        let sides = Sides::of(grid, &origins);
+        Some(Self { grid, sides })
+    }
+
+    /// The share, 0 ..= 1, of a value that comes from samples at these directions, not at the exchanged ones.
+    pub fn there(&self, light: Direction, view: Direction) -> f64 {
+        let [light, view] = [light, view].map(|d| node(self.grid, d));
+        self.sides.there(light, view)
+    }
+}
+
+/// The node nearest to a direction; beyond the last ring one of that.
+fn node(grid: Grid, direction: Direction) -> usize {
+    let (theta, phi) = (direction.theta_deg(), direction.phi_deg());
+    let last = (grid.n_theta() - 1) as f64 * grid.step_deg();
+    grid.nearest(theta.min(last), phi).unwrap_or(0)
+}
 
 /// Of each cell, which share of its value comes from samples at its own light and view.
 pub(super) struct Sides {
@@ -183,6 +218,17 @@ mod tests {
         let there = sides.there(beside, below);
         assert!(there > 0.9, "{there}");
         assert!((there + sides.there(below, beside) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_fit_of_samples_knows_its_side_and_the_horizon_is_no_matter() {
+        let at = Direction::from_deg;
+        let sides = SidesOfSamples::of([(at(60.0, 1.0), at(13.0, 181.0))].into_iter()).unwrap();
+        assert_eq!(sides.there(at(61.0, 0.0), at(12.0, 180.0)), 1.0);
+        assert_eq!(sides.there(at(12.0, 180.0), at(61.0, 0.0)), 0.0);
+        assert!(sides.there(at(90.0, 0.0), at(20.0, 180.0)) > 0.8);
+        let none = SidesOfSamples::of(std::iter::empty()).unwrap();
+        assert_eq!(none.there(at(10.0, 0.0), at(20.0, 0.0)), 0.5);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub enum Behind {
     /// The fit that its values are of.
     Fit {
         /// The fit.
-        fit: FitOfSamples,
+        fit: Box<FitOfSamples>,
         /// The files of its samples.
         samples: Vec<PathBuf>,
         /// What is to be said of these.
@@ -80,7 +80,7 @@ impl Behind {
             ));
         }
         Ok(Self::Fit {
-            fit,
+            fit: Box::new(fit),
             samples,
             remarks,
         })

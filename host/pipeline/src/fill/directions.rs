@@ -2,11 +2,11 @@
 
 use super::groups::{groups, spread_over, stand_for_themselves};
 use crate::Error;
-use crate::budget::{Equation, PLACES, Part, Slant, places, shape};
+use crate::budget::{Equation, PLACES, Part, SidesOfSamples, Slant, places, shape};
 use crate::warnings;
 use gonia_brdf::interpolate::FillError;
 use gonia_brdf::scattered::{Choice, Reason, ScatteredFit};
-use gonia_brdf::{Direction, Elementary, MirrorPlane, Sample, SymmetryKind};
+use gonia_brdf::{Direction, Elementary, MirrorPlane, Sample, Symmetry, SymmetryKind};
 use gonia_rig::{Budget, Channels, Remark, SampleValues};
 
 /// More samples than this are not asked without a grid.
@@ -17,10 +17,14 @@ pub struct FitOfSamples {
     channels: Channels,
     groups: Groups,
     choice: Choice,
+    /// Where the samples lie; empty where values follow from their images by a symmetry too.
+    measured: Vec<Pair>,
 }
 
 /// A pair of light and view.
 type Pair = (Direction, Direction);
+/// The measurement equation, and of each pair the share of its data that lie there and not at the reciprocal pair.
+type Sided<'a> = (&'a Equation, &'a [f64]);
 /// A fit of some of the channels, with their numbers.
 type Group<const N: usize> = ([usize; N], ScatteredFit<N>);
 
@@ -91,6 +95,10 @@ impl FitOfSamples {
         if choice.reason == Reason::Assumed {
             remarks.push(warnings::remark_on_assumed_isotropy());
         }
+        let measured = match choice.settings.symmetry {
+            Symmetry::None => spread.iter().map(directions_of).collect(),
+            _ => Vec::new(),
+        };
         let groups = match n {
             _ if stand_for_themselves(n) => Groups::OfThree(vec![(spread_over(n), fit)]),
             10.. => Groups::OfMany(fits_of(&fit, &samples)),
@@ -100,6 +108,7 @@ impl FitOfSamples {
             channels: samples.channels().clone(),
             groups,
             choice,
+            measured,
         };
         Ok((fit, remarks))
     }
@@ -122,9 +131,18 @@ impl FitOfSamples {
         budget: Option<&Budget>,
     ) -> Vec<Vec<[f32; 2]>> {
         let equation = budget.map(Equation::new);
+        let sides = equation
+            .as_ref()
+            .and_then(|_| SidesOfSamples::of(self.measured.iter().copied()));
+        let there = |pair: &Pair| sides.as_ref().map_or(0.5, |of| of.there(pair.0, pair.1));
         let asked: Vec<_> = pairs.iter().flat_map(|(i, v)| places(*i, *v)).collect();
         let mut all = vec![vec![[0.0f32; 2]; self.channels.count()]; pairs.len()];
-        let given = (pairs, &asked[..], equation.as_ref());
+        let there: Vec<f64> = pairs.iter().map(there).collect();
+        let given = (
+            pairs,
+            &asked[..],
+            equation.as_ref().map(|e| (e, &there[..])),
+        );
         match &self.groups {
             Groups::OfThree(groups) => groups.iter().for_each(|g| known(g, given, &mut all)),
             Groups::OfMany(groups) => groups.iter().for_each(|g| known(g, given, &mut all)),
@@ -146,18 +164,18 @@ impl FitOfSamples {
 /// Values and standard uncertainties of a group's channels at pairs, by those at the places around them.
 fn known<const N: usize>(
     (channels, fit): &Group<N>,
-    (pairs, asked, equation): (&[Pair], &[Pair], Option<&Equation>),
+    (pairs, asked, equation): (&[Pair], &[Pair], Option<Sided<'_>>),
     all: &mut [Vec<[f32; 2]>],
 ) {
     let found = fit.at_all(asked);
     let (found, _) = found.as_chunks::<PLACES>();
-    for ((about, out), (light, view)) in found.iter().zip(all).zip(pairs) {
+    for (k, ((about, out), (light, view))) in found.iter().zip(all).zip(pairs).enumerate() {
         for (c, channel) in channels.iter().enumerate() {
             let (value, noise) = (about[0].0[c], about[0].1[c]);
-            let known = equation.map_or(0.0, |equation| {
+            let known = equation.map_or(0.0, |(equation, there)| {
                 let shape = shape(&about.map(|(value, _)| value[c]));
                 let (light, view) = (Slant::of(*light), Slant::of(*view));
-                let effects = equation.of_reciprocal((&light, &view), &shape, 0.5);
+                let effects = equation.of_reciprocal((&light, &view), &shape, there[k]);
                 let scale = effects.u(Part::Scale);
                 value * effects.u(Part::Direction).hypotenuse(scale)
             });
@@ -173,4 +191,11 @@ fn fits_of<const N: usize>(fit: &ScatteredFit, samples: &SampleValues) -> Vec<Gr
         .into_iter()
         .map(of_group)
         .collect()
+}
+
+fn directions_of(sample: &Sample) -> Pair {
+    (
+        Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into()),
+        Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into()),
+    )
 }

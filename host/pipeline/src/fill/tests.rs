@@ -426,3 +426,41 @@ fn an_isotropic_material_seen_from_all_around_is_the_mean_over_turns_and_nearer_
     );
     assert!(!filled.account.settings.contains("turns"));
 }
+
+#[test]
+fn the_uncertainty_of_a_fit_of_samples_is_that_of_the_side_on_which_they_lie() {
+    let mut random = Random::new(5);
+    // Light from near the horizon, views near the normal.
+    let samples: Vec<Sample> = (0..300)
+        .map(|_| {
+            let light = Direction::from_deg(random.between(55.0, 65.0), random.between(0.0, 360.0));
+            let view = Direction::from_deg(random.between(5.0, 20.0), random.between(0.0, 360.0));
+            let along = light.to_vec3()[0] + view.to_vec3()[0];
+            Sample::new(light, view, [(0.3 + 0.05 * along) as f32; 3])
+        })
+        .collect();
+    let (fit, _) = FitOfSamples::new(samples, Some(SymmetryKind::None)).unwrap();
+    let (light, view) = (
+        Direction::from_deg(60.0, 10.0),
+        Direction::from_deg(12.0, 200.0),
+    );
+    let pairs = [(light, view), (view, light)];
+    let tilt = crate::budget::fixture::uncertain_of(&[(gonia_rig::Input::ReferenceTilt, 1.0)]);
+    let squares = |budget| {
+        let found = fit.with_uncertainty(&pairs, budget);
+        [0, 1].map(|k| {
+            let [value, u] = found[k][0];
+            f64::from(u / value).powi(2)
+        })
+    };
+    let (noise, with) = (squares(None), squares(Some(&tilt)));
+    // One degree about either axis, times tan 60°, at both places: the second one's value is of the same samples.
+    let expected = 1f64.to_radians() * 60f64.to_radians().tangent();
+    for k in 0..2 {
+        let by_tilt = (with[k] - noise[k]).sqrt();
+        assert!(
+            (by_tilt / expected - 1.0).abs() < 0.05,
+            "{by_tilt} {expected}"
+        );
+    }
+}
