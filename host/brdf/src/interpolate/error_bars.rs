@@ -118,7 +118,7 @@ impl Calibration {
             }
         }
         let mut calibration = Self {
-            parts: [(); 3].map(|()| Classes::new::<N>(&[], &noise)),
+            parts: [(); 3].map(|()| Classes::new::<N>(&[], &noise, &obliquity)),
             bright,
             obliquity,
             noise,
@@ -128,8 +128,8 @@ impl Calibration {
             let of_part = |m: &&MeanPrediction<N>| calibration.part(m.first.log) == part;
             let own: Vec<&MeanPrediction<N>> = all.iter().copied().filter(of_part).collect();
             calibration.parts[part] = match own.len() >= TESTS_OF_CLASS {
-                true => Classes::new(&own, &noise),
-                false => Classes::of_rare(&own, &Classes::new(&all, &noise), &noise),
+                true => Classes::new(&own, &noise, &obliquity),
+                false => Classes::of_rare(&own, &Classes::new(&all, &noise, &obliquity), &noise),
             };
         }
         calibration
@@ -182,7 +182,11 @@ impl Calibration {
 }
 
 impl Classes {
-    fn new<const N: usize>(means: &[&MeanPrediction<N>], noise: &BinNoise) -> Self {
+    fn new<const N: usize>(
+        means: &[&MeanPrediction<N>],
+        noise: &BinNoise,
+        obliquity: &Obliquity,
+    ) -> Self {
         let size = |m: &MeanPrediction<N>| size(m.first.variance);
         let mut sorted: Vec<&MeanPrediction<N>> = means.to_vec();
         sorted.sort_by(|a, b| size(a).total_cmp(&size(b)));
@@ -199,7 +203,9 @@ impl Classes {
             }
             let (class, others) = rest.split_at(n);
             limits.extend(class.last().map(|last| size(last)));
-            factors.push(factor_of(class, noise) * of_few_groups(class));
+            // The usual factor is that of the blocks' own variances, which are multiplied here.
+            let usual = USUAL_FACTOR * USUAL_FACTOR / obliquity.mean_square(class);
+            factors.push(factor_of(class, noise, usual) * of_few_groups(class));
             rest = others;
         }
         limits.pop();

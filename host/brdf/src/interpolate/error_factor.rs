@@ -126,15 +126,19 @@ impl Residual {
 /// would count too little); then the mean of that
 /// and of the usual one, weighted by their uncertainties. Of residuals that are nearly all noise, the
 /// percentile says nothing.
-pub(super) fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> f32 {
+/// `usual` is the square of the usual one, in the unit of the variances.
+pub(super) fn factor_of<const N: usize>(
+    class: &[&MeanPrediction<N>],
+    noise: &BinNoise,
+    usual: f32,
+) -> f32 {
     let all: Vec<Residual> = class
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
         .collect();
     let mut squares: Vec<(f32, f32)> = all.iter().map(|r| (r.beyond_noise(), r.weight)).collect();
-    let usual = USUAL_FACTOR * USUAL_FACTOR;
     let Some(square) = weighted_quantile(&mut squares, 0.95) else {
-        return USUAL_FACTOR;
+        return usual.sqrt();
     };
     let sum = |of: fn(&Residual) -> f32| all.iter().map(|r| r.weight * of(r)).sum::<f32>();
     let noise_share = sum(|r| r.noise) / (sum(|r| r.variance) * square.max(usual));
