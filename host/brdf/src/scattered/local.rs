@@ -104,7 +104,7 @@ fn same_datum(near: &[Near]) -> Vec<(usize, usize)> {
 }
 
 /// The places of a neighbourhood, and how their values are kriged.
-struct Places<'a> {
+struct Surroundings<'a> {
     arch: Arch,
     near: &'a [Near],
     at: &'a Axes,
@@ -112,7 +112,7 @@ struct Places<'a> {
     settings: &'a Settings,
 }
 
-impl Places<'_> {
+impl Surroundings<'_> {
     /// The system of channels that respond alike, and what is solved with it: their weights.
     fn solved(
         &self,
@@ -222,7 +222,7 @@ impl<const N: usize> Local<N> {
         if all.iter().all(|values| *values == all[0]) {
             all.truncate(1);
         }
-        let places = Places {
+        let around = Surroundings {
             arch,
             near,
             at: &at,
@@ -240,7 +240,7 @@ impl<const N: usize> Local<N> {
             }
             let values: Vec<&[f64]> = alike.iter().map(|c| &all[*c][..]).collect();
             let variances = here.iter().map(|d| 1.0 / d.count).collect();
-            let (system, solved) = places.solved(response, variances, &values)?;
+            let (system, solved) = around.solved(response, variances, &values)?;
             for (c, channel) in alike.into_iter().zip(solved) {
                 channels[c] = Some(Channel {
                     system: systems.len(),
