@@ -26,10 +26,30 @@ impl MirrorPlane {
         f64::from(self.azimuth_mdeg) / 1000.0
     }
 
-    /// Cosine and sine of twice its azimuth.
-    fn twice(self) -> [f64; 2] {
+    /// What takes places to their images on its other side.
+    pub(crate) fn reflection(self) -> Reflection {
         let (sin, cos) = (2.0 * self.azimuth_deg()).to_radians().sine_cosine();
-        [cos, sin]
+        Reflection([cos, sin])
+    }
+}
+
+/// Takes places to the other side of a plane: cosine and sine of twice its azimuth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reflection([f64; 2]);
+
+impl Reflection {
+    /// The image of a place.
+    #[inline]
+    pub fn of(self, p: &Pair) -> Pair {
+        let Self([cos, sin]) = self;
+        [
+            cos * p[0] + sin * p[1],
+            sin * p[0] - cos * p[1],
+            p[2],
+            cos * p[3] + sin * p[4],
+            sin * p[3] - cos * p[4],
+            p[5],
+        ]
     }
 }
 
@@ -172,11 +192,11 @@ impl Symmetry {
 
     /// One of these images; 0 is the pair itself. Each is its own inverse.
     pub(crate) fn image(self, pair: Pair, number: usize) -> Pair {
-        let other = |plane: MirrorPlane| reflected(pair, plane.twice());
+        let other = |plane: MirrorPlane| plane.reflection().of(&pair);
         match (self, number) {
             (_, 0) | (Symmetry::None | Symmetry::Turns, _) => pair,
             (Symmetry::HalfTurn, _) | (Symmetry::HalfTurnBilateral(_), 1) => turned(pair, HALF),
-            (Symmetry::Isotropic, _) => reflected(pair, [1.0, 0.0]),
+            (Symmetry::Isotropic, _) => Reflection([1.0, 0.0]).of(&pair),
             (Symmetry::Bilateral(plane), _) | (Symmetry::HalfTurnBilateral(plane), 2) => {
                 other(plane)
             }
@@ -255,18 +275,6 @@ fn turned(p: Pair, [cos, sin]: [f64; 2]) -> Pair {
         p[2],
         cos * p[3] - sin * p[4],
         sin * p[3] + cos * p[4],
-        p[5],
-    ]
-}
-
-/// A pair with light and view on the other side of the plane with this cosine and sine of twice its azimuth.
-fn reflected(p: Pair, [cos, sin]: [f64; 2]) -> Pair {
-    [
-        cos * p[0] + sin * p[1],
-        sin * p[0] - cos * p[1],
-        p[2],
-        cos * p[3] + sin * p[4],
-        sin * p[3] - cos * p[4],
         p[5],
     ]
 }

@@ -212,6 +212,9 @@ pub const FIGURES: &[Figure] = &[
         run("cargo bench -p gonia-brdf --bench channels -- fabric default"),
         run("cargo bench -p gonia-brdf --bench channels -- fabric best"),
     ]),
+    figure("channels-few", 1.0, Tables, &[
+        run("cargo bench -p gonia-brdf --bench channels -- fabric few 1000 10000 100000"),
+    ]),
     figure("target-error", 1.0, Tables, &[
         run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0"),
         run("cargo bench -p gonia-brdf --bench fill -- sharp --poses 2000 --step 4 --noise 0.002 --target-error 0.005"),

@@ -62,7 +62,7 @@ pub fn fill(
         })?;
     for plane in &mut planes {
         mirror(n, plane);
-        spread_poles(grid, plane);
+        spread_poles(grid, true, plane);
     }
     let tally = filler.tally();
     Ok(BaselineFill {

@@ -80,7 +80,7 @@ impl<const N: usize> SharedPlanes<N> {
                 .into_iter()
                 .map(|bits| f32::from_bits(bits.into_inner()))
                 .collect();
-            spread_poles(grid, &mut plane);
+            spread_poles(grid, true, &mut plane);
             plane
         })
     }
@@ -100,8 +100,8 @@ fn runs(patch: &Patch) -> impl Iterator<Item = (usize, usize, usize)> {
         })
 }
 
-/// Copies the pole's value, computed at azimuth 0, to all azimuths, for light and view.
-pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
+/// Copies the pole's value, computed at azimuth 0, to all azimuths, for view and, where the plane begins with it, for light.
+pub(crate) fn spread_poles(grid: Grid, has_pole_of_light: bool, plane: &mut [f32]) {
     if plane.is_empty() {
         return;
     }
@@ -110,7 +110,8 @@ pub(crate) fn spread_poles(grid: Grid, plane: &mut [f32]) {
         let pole = row[0];
         row[1..n_phi].fill(pole);
     }
-    for row in 1..n_phi {
+    let rows = if has_pole_of_light { n_phi } else { 0 };
+    for row in 1..rows {
         plane.copy_within(0..n, row * n);
     }
 }

@@ -4,8 +4,9 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted, Work};
 use super::narrow::Narrow;
+use super::patches::{PatchPair, pairs};
 use super::places::{Near, distance2, exchanged, radius_of};
-use super::planes::{Block, Rows, planes_of, three};
+use super::planes::{Block, Rows, of_all, planes_of};
 use super::quadratic::{By, Cells, Determined, Few, Stages, weights};
 use super::wide::exponentials;
 use crate::dense::DenseBrdf;
@@ -13,12 +14,12 @@ use crate::direction::Direction;
 use crate::elementary::Elementary;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
-use crate::symmetry::Symmetry;
+use crate::interpolate::planes::spread_poles;
+use crate::symmetry::{MirrorPlane, Reflection};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Side of the patches of directions that the work begins with, degrees.
-const PATCH_DEG: f64 = 16.0;
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
 const SHARED: f64 = 1.0;
 /// Quarters of the neighbours of one place that a system of many has.
@@ -40,20 +41,20 @@ const HALVED_AGAIN: f64 = 1.15;
 const PARTS: f64 = 4.0;
 
 /// The systems of some cells: of their places, and where data contradict reciprocity, of the reciprocal ones.
-struct Systems {
-    own: Local,
-    reciprocal: Option<Local>,
+struct Systems<const N: usize> {
+    own: Local<N>,
+    reciprocal: Option<Local<N>>,
 }
 
-impl Systems {
-    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
+impl<const N: usize> Systems<N> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; N] {
         match self.reciprocal {
             None => self.own.logs_at(place, work),
             Some(_) => self.at(place, false, work).value.map(f64::natural_log),
         }
     }
 
-    fn at(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted {
+    fn at(&self, place: &Pair, with_error: bool, work: &mut Work) -> Predicted<N> {
         match &self.reciprocal {
             None => self.own.at_with(place, with_error, work),
             Some(reciprocal) => super::averaged(
@@ -64,26 +65,42 @@ impl Systems {
     }
 }
 
-/// Cells that share systems, and what holds for all of them.
-struct Shares<'a> {
-    systems: &'a Systems,
+/// Systems, and how near their values are needed.
+struct Solved<'a, const N: usize> {
+    systems: &'a Systems<N>,
     /// The same in single precision, where that is near enough.
-    narrow: Option<Narrow>,
-    pair: &'a Cells,
-    cells: Cells,
+    narrow: Option<Narrow<N>>,
     /// What logarithms may be off by.
     tolerance: f64,
+}
+
+/// Cells that share systems, and what holds for all of them.
+struct Shares<'a, const N: usize> {
+    solved: &'a Solved<'a, N>,
+    /// The pair of patches that they are of.
+    pair: &'a Cells,
+    cells: Cells,
+    /// The plane of symmetry, where the systems are of the cells beyond it.
+    beyond: Option<Reflection>,
     /// Relative standard errors at the nodes, channel by channel, where errors are wanted.
     errors: Vec<Vec<f64>>,
 }
 
-impl Shares<'_> {
-    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; 3] {
-        match &self.narrow {
-            Some(narrow) => self.systems.own.logs_of(narrow.sums(place)),
-            None => self.systems.logs_at(place, work),
+impl<const N: usize> Shares<'_, N> {
+    fn logs_at(&self, place: &Pair, work: &mut Work) -> [f64; N] {
+        let place = &self.beyond.map_or(*place, |plane| plane.of(place));
+        match &self.solved.narrow {
+            Some(narrow) => self.solved.systems.own.logs_of(narrow.sums(place)),
+            None => self.solved.systems.logs_at(place, work),
         }
     }
+}
+
+/// Values and errors of a pair of patches.
+#[derive(Default)]
+struct Blocks {
+    values: Block,
+    errors: Block,
 }
 
 /// Memory of one thread.
@@ -92,46 +109,58 @@ struct Memory {
     work: Work,
     stages: Stages,
     relative: Vec<f64>,
-    /// Values and errors of the pair of patches that is worked on.
-    block: Block,
-    errors: Block,
+    /// The pair of patches that is worked on, and the one beyond the plane of symmetry.
+    blocks: [Blocks; 2],
 }
 
-struct Filler<'a> {
-    fit: &'a ScatteredFit,
+struct Filler<'a, const N: usize> {
+    fit: &'a ScatteredFit<N>,
     grid: Grid,
     channels: usize,
     with_errors: bool,
     /// The system of all data, where they are few.
-    one: Option<Systems>,
+    one: Option<Systems<N>>,
     arch: Arch,
-    /// Sine and cosine of every quarter of a step, up to a turn.
+    plane: Option<Reflection>,
+    /// Sine and cosine of every quarter of a step, up to two turns.
     angles: Vec<(f64, f64)>,
 }
 
 /// Logarithms on lines through the middle of a part.
-struct Lines {
-    middle: [f64; 3],
+struct Lines<const N: usize> {
+    middle: [f64; N],
     /// First and last along each axis, where that is longer than its nodes.
-    ends: [[[f64; 3]; 2]; 4],
+    ends: [[[f64; N]; 2]; 4],
     /// How far logarithms are from quadratic, axis by axis, up to the one with which that is too far.
     bends: [f64; 4],
     /// Whether they are near enough.
     are_quadratic: bool,
 }
 
-impl ScatteredFit {
+impl<const N: usize> ScatteredFit<N> {
     /// [`Self::dense`] of a fit that depends on all four angles.
     pub(super) fn dense_by_cells(
         &self,
         grid: Grid,
         with_errors: bool,
-    ) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
-        let is_grey = |v: &[f64; 3]| v[0] == v[1] && v[1] == v[2];
-        let channels = match self.data.iter().all(|d| is_grey(&d.value)) {
-            true => 1,
-            false => 3,
-        };
+    ) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
+        let all = 0..grid.n_theta();
+        let (values, errors) = self.planes_by_cells(grid, all, with_errors);
+        let dense = DenseBrdf::from_planes(grid, of_all(values));
+        (dense, with_errors.then(|| of_all(errors)))
+    }
+
+    /// Values of cells of lights on some rings, a plane a channel, or one for all channels that are alike; and their
+    /// standard errors.
+    pub(super) fn planes_by_cells(
+        &self,
+        grid: Grid,
+        rings: Range<usize>,
+        with_errors: bool,
+    ) -> (Vec<Vec<f32>>, Vec<Vec<f32>>) {
+        let channels = self.channels();
+        let symmetry = self.choice.settings.symmetry;
+        let turn = PARTS as usize * grid.n_phi();
         let mut filler = Filler {
             fit: self,
             grid,
@@ -139,9 +168,10 @@ impl ScatteredFit {
             with_errors,
             one: None,
             arch: Arch::new(),
-            angles: (0..=(PARTS as usize * grid.n_phi()))
+            plane: symmetry.plane().map(MirrorPlane::reflection),
+            angles: (0..=2 * turn)
                 .map(|k| {
-                    (k as f64 / PARTS * grid.step_deg())
+                    ((k % turn) as f64 / PARTS * grid.step_deg())
                         .to_radians()
                         .sine_cosine()
                 })
@@ -153,81 +183,58 @@ impl ScatteredFit {
             let near = filler.near(place, self.places.images());
             filler.one = filler.systems(&near);
         }
-        let mut values = planes_of(grid, channels);
-        let mut errors = planes_of(grid, if with_errors { channels } else { 0 });
-        let rows = Rows::of(grid, &mut values);
-        let rows_of_errors = Rows::of(grid, &mut errors);
-        pairs(grid, self.choice.settings.symmetry)
+        let mut values = planes_of(grid, rings.len(), channels);
+        let errors_of = if with_errors { channels } else { 0 };
+        let mut errors = planes_of(grid, rings.len(), errors_of);
+        let rows = Rows::of(grid, rings.start, &mut values);
+        let rows_of_errors = Rows::of(grid, rings.start, &mut errors);
+        let is_wanted = |pair: &PatchPair| {
+            let cells = &pair.cells;
+            [0, 2]
+                .iter()
+                .any(|axis| cells.start[*axis] < rings.end && rings.start < cells.end[*axis])
+        };
+        // What shares one system anyway need not lie side by side.
+        pairs(grid, symmetry, filler.one.is_none())
             .par_iter()
             .with_max_len(8)
+            .filter(|pair| is_wanted(pair))
             .for_each_init(Memory::default, |memory, pair| {
-                memory.block.clear(pair, channels);
-                if with_errors {
-                    memory.errors.clear(pair, channels);
+                let beyond = pair.beyond.map(|beyond| beyond.cells);
+                let both = || std::iter::once(pair.cells).chain(beyond);
+                for (cells, blocks) in both().zip(&mut memory.blocks) {
+                    blocks.values.clear(&cells, channels);
+                    blocks.errors.clear(&cells, errors_of);
                 }
-                filler.fill(pair, *pair, f64::INFINITY, memory);
-                memory.block.store(pair, grid, &rows);
-                if with_errors {
-                    memory.errors.store(pair, grid, &rows_of_errors);
+                filler.fill(pair, pair.cells, f64::INFINITY, memory);
+                for (cells, blocks) in both().zip(&mut memory.blocks) {
+                    blocks.values.store(&cells, grid, &rows);
+                    blocks.errors.store(&cells, grid, &rows_of_errors);
                 }
             });
-        let errors = with_errors.then(|| three(grid, errors));
-        (DenseBrdf::from_planes(grid, three(grid, values)), errors)
+        for plane in values.iter_mut().chain(&mut errors) {
+            spread_poles(grid, rings.start == 0, plane);
+        }
+        (values, errors)
     }
 }
 
-/// The first row and column of a patch of directions, and their ends.
-type Patch = [[usize; 2]; 2];
-
-/// The pairs of patches that all others follow from.
-fn pairs(grid: Grid, symmetry: Symmetry) -> Vec<Cells> {
-    let rings = rings(grid);
-    let patches: Vec<Patch> = rings.iter().flatten().copied().collect();
-    // Half a turn on lies the patch half a ring further.
-    let mut turned = Vec::with_capacity(patches.len());
-    for ring in &rings {
-        let (first, n) = (turned.len(), ring.len());
-        turned.extend((0..n).map(|k| first + (k + n / 2) % n));
-    }
-    let mut pairs = Vec::new();
-    for p in 0..patches.len() {
-        for q in p..patches.len() {
-            let other = (turned[p].min(turned[q]), turned[p].max(turned[q]));
-            let is_half_turn = symmetry.has_half_turn();
-            if is_half_turn && other < (p, q) {
-                continue;
+/// Puts values at nodes in the order that the nodes beyond a plane have: those of azimuths are turned over.
+fn turn_over(values: &mut [f64], nodes: [usize; 4]) {
+    for views in values.chunks_exact_mut(nodes[1] * nodes[2] * nodes[3]) {
+        // All four axes from the last to the first, …
+        views.reverse();
+        let rows = views.chunks_exact_mut(nodes[2] * nodes[3]);
+        for views in rows {
+            // … and the polar angle of view back.
+            let (mut low, mut high) = (0, nodes[2] - 1);
+            while low < high {
+                let (first, last) = views.split_at_mut(high * nodes[3]);
+                first[low * nodes[3]..][..nodes[3]].swap_with_slice(&mut last[..nodes[3]]);
+                (low, high) = (low + 1, high - 1);
             }
-            let ([a, b], [c, d]) = (patches[p], patches[q]);
-            pairs.push(Cells {
-                start: [a[0], a[1], c[0], c[1]],
-                end: [b[0], b[1], d[0], d[1]],
-                is_own: p == q,
-                is_turned: is_half_turn && other != (p, q),
-            });
         }
     }
-    pairs
-}
-
-/// Patches of directions, about as wide as high, ring by ring: the pole, then even numbers of them.
-fn rings(grid: Grid) -> Vec<Vec<Patch>> {
-    let (n_theta, n_phi) = (grid.n_theta(), grid.n_phi());
-    let count = ((n_theta - 1) as f64 * grid.step_deg() / PATCH_DEG).ceil() as usize;
-    let count = count.clamp(1, (n_theta - 1).max(1));
-    // All azimuths of the pole are one direction.
-    let mut rings = vec![vec![[[0, 0], [1, 1]]]];
-    for ring in 0..count {
-        let [first, end] = [ring, ring + 1].map(|r| 1 + r * (n_theta - 1) / count);
-        let theta = (0.5 * (first + end - 1) as f64 * grid.step_deg()).to_radians();
-        let across = 2 * (180.0 * theta.sine() / PATCH_DEG).ceil() as usize;
-        let across = across.clamp(4, n_phi);
-        let patch = |k: usize| {
-            let [left, right] = [k, k + 1].map(|k| k * n_phi / across);
-            [[first, left], [end, right]]
-        };
-        rings.push((0..across).map(patch).collect());
-    }
-    rings
 }
 
 /// The data around a place, and where they contradict reciprocity, around the reciprocal one.
@@ -243,7 +250,7 @@ impl Neighbourhood {
     }
 }
 
-impl Filler<'_> {
+impl<const N: usize> Filler<'_, N> {
     fn place(&self, [i, phi_i, v, phi_v]: [f64; 4]) -> Pair {
         let of = |x: f64| self.angles[(PARTS * x).round() as usize];
         let direction = |theta: f64, phi: f64| {
@@ -263,7 +270,7 @@ impl Filler<'_> {
         }
     }
 
-    fn systems(&self, near: &Neighbourhood) -> Option<Systems> {
+    fn systems(&self, near: &Neighbourhood) -> Option<Systems<N>> {
         let system = |near: &Vec<Near>| Local::fit(&self.fit.data, near, &self.fit.choice.settings);
         Some(Systems {
             own: system(&near.own)?,
@@ -276,7 +283,7 @@ impl Filler<'_> {
 
     /// Fills cells: by one system where they are small against its neighbourhood, else half by half.
     /// `around` is the radius around those that they are half of.
-    fn fill(&self, pair: &Cells, cells: Cells, around: f64, memory: &mut Memory) {
+    fn fill(&self, pair: &PatchPair, cells: Cells, around: f64, memory: &mut Memory) {
         let number = |row: usize, column: usize| row * self.grid.n_phi() + column;
         let first_light = number(cells.start[0], cells.start[1]);
         if cells.is_own && first_light > number(cells.end[2] - 1, cells.end[3] - 1) {
@@ -287,10 +294,7 @@ impl Filler<'_> {
             return self.share(one, pair, (cells, f64::INFINITY), memory);
         }
         let middle = self.place(cells.middle());
-        let reach = (0..16)
-            .map(|bits| distance2(&self.place(cells.corner(bits)), &middle))
-            .fold(0.0, f64::max)
-            .sqrt();
+        let reach = self.reach_from(&middle, pair, &cells);
         let halve = |radius: f64, memory: &mut Memory| {
             for half in cells.halves(self.longest(&cells)) {
                 self.fill(pair, half, radius, memory);
@@ -305,6 +309,20 @@ impl Filler<'_> {
         } else if let Some(systems) = self.systems(&near) {
             self.share(&systems, pair, (cells, reach), memory);
         }
+    }
+
+    /// How far corners of cells are from a place, and corners of those beyond the plane of symmetry from its image.
+    fn reach_from(&self, middle: &Pair, pair: &PatchPair, cells: &Cells) -> f64 {
+        let corners = |cells: Cells| (0..16).map(move |bits| self.place(cells.corner(bits)));
+        let beyond = self.plane.zip(pair.beyond).map(|(plane, beyond)| {
+            let image = plane.of(middle);
+            corners(beyond.of(cells)).map(move |corner| distance2(&corner, &image))
+        });
+        corners(*cells)
+            .map(|corner| distance2(&corner, middle))
+            .chain(beyond.into_iter().flatten())
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 
     /// The axes of more than two cells, that along which they reach farthest first.
@@ -330,11 +348,12 @@ impl Filler<'_> {
         longest.unwrap_or(0)
     }
 
-    /// Fills cells, none of which is farther from their middle than they reach, by systems that they share.
+    /// Fills cells, none of which is farther from their middle than they reach, and those beyond the plane of symmetry, by
+    /// systems that they share.
     fn share(
         &self,
-        systems: &Systems,
-        pair: &Cells,
+        systems: &Systems<N>,
+        pair: &PatchPair,
         (cells, reach): (Cells, f64),
         memory: &mut Memory,
     ) {
@@ -352,26 +371,40 @@ impl Filler<'_> {
         let tolerance = TOLERANCE * self.fit.choice.error_factor * relative;
         let tolerance = tolerance.max(TOLERANCE_MIN);
         let narrow = || systems.own.narrow((at, reach), NARROW * tolerance);
-        let shares = Shares {
+        let solved = Solved {
             systems,
             narrow: systems.reciprocal.is_none().then(narrow).flatten(),
-            pair,
-            cells,
             tolerance,
+        };
+        let mut shares = Shares {
+            solved: &solved,
+            pair: &pair.cells,
+            cells,
+            beyond: None,
             errors,
         };
         self.refine(&shares, cells, memory);
+        let Some(beyond) = &pair.beyond else {
+            return;
+        };
+        // Errors change little over the half a step, at most, by which these cells miss the images of the others.
+        let nodes = [0, 1, 2, 3].map(|axis| cells.length(axis).min(3));
+        shares.errors.iter_mut().for_each(|e| turn_over(e, nodes));
+        shares.pair = &beyond.cells;
+        shares.cells = beyond.of(&cells);
+        shares.beyond = self.plane;
+        self.refine(&shares, shares.cells, memory);
     }
 
     /// Logarithms of relative standard errors at all nodes of cells, channel by channel. Between the few that are computed
     /// they stay within these.
-    fn errors(&self, systems: &Systems, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    fn errors(&self, systems: &Systems<N>, cells: &Cells, work: &mut Work) -> Vec<Vec<f64>> {
+        let (mut low, mut high) = ([f64::INFINITY; N], [f64::NEG_INFINITY; N]);
         let mut logs = |place: Pair| {
             let relative = systems.at(&place, true, work).relative;
             let logs = relative.map(|r| (self.fit.choice.error_factor * r).natural_log());
-            low = [0, 1, 2].map(|c| low[c].min(logs[c]));
-            high = [0, 1, 2].map(|c| high[c].max(logs[c]));
+            low = std::array::from_fn(|c| low[c].min(logs[c]));
+            high = std::array::from_fn(|c| high[c].max(logs[c]));
             logs
         };
         let mut nodes = if (0..4).all(|axis| cells.length(axis) > 2) {
@@ -412,7 +445,7 @@ impl Filler<'_> {
     }
 
     /// Fills a part of cells that share systems: between its nodes where that is near enough.
-    fn refine(&self, shares: &Shares<'_>, part: Cells, memory: &mut Memory) {
+    fn refine(&self, shares: &Shares<'_, N>, part: Cells, memory: &mut Memory) {
         if part.count() <= DIRECT {
             let mut channels = vec![Vec::new(); self.channels];
             let [lights, views] = [0, 2].map(|axis| part.directions(axis, self.grid, 0));
@@ -464,9 +497,9 @@ impl Filler<'_> {
     /// What determines the logarithms of a part, channel by channel.
     fn nodes(
         &self,
-        shares: &Shares<'_>,
+        shares: &Shares<'_, N>,
         part: &Cells,
-        lines: &Lines,
+        lines: &Lines<N>,
         work: &mut Work,
     ) -> (By, Vec<Vec<f64>>) {
         let mut logs = |place: Pair| shares.logs_at(&place, work);
@@ -484,10 +517,10 @@ impl Filler<'_> {
     fn few_nodes(
         &self,
         cells: &Cells,
-        (middle, ends): ([f64; 3], [[[f64; 3]; 2]; 4]),
-        at: &mut impl FnMut(Pair) -> [f64; 3],
+        (middle, ends): ([f64; N], [[[f64; N]; 2]; 4]),
+        at: &mut impl FnMut(Pair) -> [f64; N],
     ) -> Vec<Few> {
-        let corners: [[f64; 3]; 16] =
+        let corners: [[f64; N]; 16] =
             std::array::from_fn(|bits| at(self.place(cells.corner(bits))));
         let few = |c: usize| Few {
             middle: middle[c],
@@ -498,7 +531,7 @@ impl Filler<'_> {
     }
 
     /// Values at all nodes of cells, each computed.
-    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; 3]) -> Vec<Vec<f64>> {
+    fn all_nodes(&self, cells: &Cells, at: &mut impl FnMut(Pair) -> [f64; N]) -> Vec<Vec<f64>> {
         let mut nodes = vec![Vec::new(); self.channels];
         self.each_node(cells, |place| {
             for (nodes, value) in nodes.iter_mut().zip(at(place)) {
@@ -508,7 +541,7 @@ impl Filler<'_> {
         nodes
     }
 
-    fn lines(&self, shares: &Shares<'_>, part: &Cells, work: &mut Work) -> Lines {
+    fn lines(&self, shares: &Shares<'_, N>, part: &Cells, work: &mut Work) -> Lines<N> {
         let mut logs = |at: [f64; 4]| shares.logs_at(&self.place(at), work);
         let at = part.middle();
         let middle = logs(at);
@@ -534,7 +567,7 @@ impl Filler<'_> {
                     bends[axis] = (found[c] - between).abs().max(bends[axis]);
                 }
             }
-            are_quadratic = bends.iter().sum::<f64>() <= shares.tolerance;
+            are_quadratic = bends.iter().sum::<f64>() <= shares.solved.tolerance;
             if !are_quadratic {
                 break;
             }
@@ -550,7 +583,7 @@ impl Filler<'_> {
     /// Whether the nodes of a part determine its values aside of the middles, too.
     fn meets_between(
         &self,
-        shares: &Shares<'_>,
+        shares: &Shares<'_, N>,
         part: &Cells,
         (by, channels): (By, &[Vec<f64>]),
         work: &mut Work,
@@ -572,14 +605,21 @@ impl Filler<'_> {
                     by,
                     values,
                 };
-                (of.at(cell) - found).abs() <= shares.tolerance
+                (of.at(cell) - found).abs() <= shares.solved.tolerance
             })
         })
     }
 
-    fn store(&self, shares: &Shares<'_>, part: Cells, channels: &[Vec<f64>], memory: &mut Memory) {
+    fn store(
+        &self,
+        shares: &Shares<'_, N>,
+        part: Cells,
+        channels: &[Vec<f64>],
+        memory: &mut Memory,
+    ) {
         for (c, values) in channels.iter().enumerate() {
-            memory.block.put(shares.pair, &part, c, values);
+            let blocks = &mut memory.blocks[usize::from(shares.beyond.is_some())];
+            blocks.values.put(shares.pair, &part, c, values);
             if !self.with_errors {
                 continue;
             }
@@ -594,8 +634,7 @@ impl Filler<'_> {
             for (error, value) in memory.relative.iter_mut().zip(values) {
                 *error *= value;
             }
-            let errors = &mut memory.errors;
-            errors.put(shares.pair, &part, c, &memory.relative);
+            blocks.errors.put(shares.pair, &part, c, &memory.relative);
         }
     }
 }

@@ -11,13 +11,13 @@ const FLOOR_SHARE: f64 = 1e-4;
 
 /// One place, and what was measured there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Datum {
+pub(super) struct Datum<const N: usize = 3> {
     pub light: Vec3,
     pub view: Vec3,
     /// Mean of the samples, per channel.
-    pub value: [f64; 3],
+    pub value: [f64; N],
     /// Natural logarithm of the value, per channel.
-    pub log: [f64; 3],
+    pub log: [f64; N],
     /// Number of samples.
     pub count: f64,
     /// What cross-validation leaves out together: the frame, or the place alone.
@@ -25,16 +25,16 @@ pub(super) struct Datum {
 }
 
 /// All places.
-pub(super) struct Data {
-    pub places: Vec<Datum>,
+pub(super) struct Data<const N: usize = 3> {
+    pub places: Vec<Datum<N>>,
     /// What counts for less, per channel, where logarithms are taken.
-    floors: [f64; 3],
+    floors: [f64; N],
 }
 
-impl Data {
-    pub fn new(samples: &[Sample]) -> Self {
+impl<const N: usize> Data<N> {
+    pub fn new(samples: &[Sample<N>]) -> Self {
         let mut places = places(samples);
-        let floors = [0, 1, 2].map(|c| floor(places.iter().map(|d| d.value[c])));
+        let floors = std::array::from_fn(|c| floor(places.iter().map(|d| d.value[c])));
         let mut data = Self {
             places: Vec::new(),
             floors,
@@ -46,18 +46,18 @@ impl Data {
         data
     }
 
-    pub fn logs(&self, value: [f64; 3]) -> [f64; 3] {
-        [0, 1, 2].map(|c| value[c].max(self.floors[c]).natural_log())
+    pub fn logs(&self, value: [f64; N]) -> [f64; N] {
+        std::array::from_fn(|c| value[c].max(self.floors[c]).natural_log())
     }
 }
 
 /// The places, in an order that depends on the samples alone, without their logarithms.
-fn places(samples: &[Sample]) -> Vec<Datum> {
-    let key = |s: &Sample| {
+fn places<const N: usize>(samples: &[Sample<N>]) -> Vec<Datum<N>> {
+    let key = |s: &Sample<N>| {
         [s.theta_i_deg, s.phi_i_deg, s.theta_v_deg, s.phi_v_deg]
             .map(|angle| (f64::from(angle) / SAME_DEG).round() as i64)
     };
-    let mut sorted: Vec<([i64; 4], &Sample)> = samples
+    let mut sorted: Vec<([i64; 4], &Sample<N>)> = samples
         .iter()
         .filter(|s| s.rgb.iter().all(|v| v.is_finite()))
         .map(|s| (key(s), s))
@@ -70,15 +70,16 @@ fn places(samples: &[Sample]) -> Vec<Datum> {
         .map(|(number, same)| {
             let count = same.len() as f64;
             let s = same[0].1;
-            let value = [0, 1, 2]
-                .map(|c| same.iter().map(|(_, s)| f64::from(s.rgb[c])).sum::<f64>() / count);
+            let value = std::array::from_fn(|c| {
+                same.iter().map(|(_, s)| f64::from(s.rgb[c])).sum::<f64>() / count
+            });
             let direction =
                 |theta: f32, phi: f32| Direction::from_deg(theta.into(), phi.into()).to_vec3();
             Datum {
                 light: direction(s.theta_i_deg, s.phi_i_deg),
                 view: direction(s.theta_v_deg, s.phi_v_deg),
                 value,
-                log: [0.0; 3],
+                log: [0.0; N],
                 count,
                 group: if framed { s.frame } else { number as u32 },
             }
@@ -87,7 +88,7 @@ fn places(samples: &[Sample]) -> Vec<Datum> {
 }
 
 /// How many places samples have.
-pub(super) fn count_places(samples: &[Sample]) -> usize {
+pub(super) fn count_places<const N: usize>(samples: &[Sample<N>]) -> usize {
     places(samples).len()
 }
 

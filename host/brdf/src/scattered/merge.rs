@@ -8,8 +8,8 @@ use crate::direction::{Vec3, normalize};
 use crate::interpolate::coordinates::Pair;
 
 /// Data, and which of the places each is the mean of.
-pub(super) struct Merged {
-    pub data: Vec<Datum>,
+pub(super) struct Merged<const N: usize = 3> {
+    pub data: Vec<Datum<N>>,
     /// Numbers of places; none where each datum is a place of its own.
     members: Vec<Vec<u32>>,
 }
@@ -22,9 +22,9 @@ struct Member {
     pair: Pair,
 }
 
-impl Merged {
+impl<const N: usize> Merged<N> {
     /// So many neighbours each as the settings say.
-    pub fn new(all: &Data, settings: &Settings) -> Self {
+    pub fn new(all: &Data<N>, settings: &Settings) -> Self {
         if settings.merged <= 1 {
             return Self {
                 data: all.places.clone(),
@@ -52,7 +52,7 @@ impl Merged {
     }
 
     /// Halves at the median of the widest axis until few enough are left.
-    fn split(&mut self, members: &mut [Member], all: &Data, at_most: usize) {
+    fn split(&mut self, members: &mut [Member], all: &Data<N>, at_most: usize) {
         if members.len() <= at_most {
             self.data.push(mean(members, all));
             self.members
@@ -77,7 +77,13 @@ impl Merged {
     }
 
     /// A datum without the places of a group: `None` where none are left.
-    pub fn without(&self, number: u32, group: u32, all: &Data, settings: &Settings) -> Without {
+    pub fn without(
+        &self,
+        number: u32,
+        group: u32,
+        all: &Data<N>,
+        settings: &Settings,
+    ) -> Without<N> {
         let Some(members) = self.members.get(number as usize) else {
             return match self.data[number as usize].group == group {
                 true => Without::Nothing,
@@ -109,14 +115,14 @@ impl Merged {
 }
 
 /// What is left of a datum without a group.
-pub(super) enum Without {
+pub(super) enum Without<const N: usize = 3> {
     Same,
-    Less(Datum),
+    Less(Datum<N>),
     Nothing,
 }
 
 /// Where turns do not matter, all are merged at one azimuth.
-fn oriented(datum: &Datum, settings: &Settings) -> (Vec3, Vec3) {
+fn oriented<const N: usize>(datum: &Datum<N>, settings: &Settings) -> (Vec3, Vec3) {
     if settings.symmetry.is_isotropic() {
         turned_to_axis(datum.light, datum.view)
     } else {
@@ -124,7 +130,7 @@ fn oriented(datum: &Datum, settings: &Settings) -> (Vec3, Vec3) {
     }
 }
 
-fn mean(members: &[Member], all: &Data) -> Datum {
+fn mean<const N: usize>(members: &[Member], all: &Data<N>) -> Datum<N> {
     let of = |m: &Member| &all.places[m.number as usize];
     let count: f64 = members.iter().map(|m| of(m).count).sum();
     let sum = |what: &dyn Fn(&Member) -> f64| {
@@ -132,7 +138,7 @@ fn mean(members: &[Member], all: &Data) -> Datum {
         weighted.sum::<f64>() / count
     };
     let direction = |what: fn(&Member) -> Vec3| normalize([0, 1, 2].map(|k| sum(&|m| what(m)[k])));
-    let value = [0, 1, 2].map(|c| sum(&|m| of(m).value[c]));
+    let value = std::array::from_fn(|c| sum(&|m| of(m).value[c]));
     Datum {
         light: direction(|m| m.light),
         view: direction(|m| m.view),

@@ -14,6 +14,7 @@ mod merge;
 mod mirror;
 mod narrow;
 mod nugget;
+mod patches;
 mod places;
 mod planes;
 mod quadratic;
@@ -41,12 +42,11 @@ use local::{Local, Predicted};
 use merge::Merged;
 use places::{Places, exchanged};
 use rayon::prelude::*;
+use std::ops::Range;
+use table::Table;
 
 /// More places than this are not few.
 pub const FEW: usize = 100_000;
-/// Above this many places of more than three channels an anisotropic material is interpolated block by block: 31 channels
-/// share a factorisation there.
-pub const FEW_OF_BANDS: usize = 20_000;
 /// Fewer places than this say nothing.
 pub const PLACES_MIN: usize = 8;
 /// Frames that hold more places than this, on average, are images of many samples.
@@ -184,12 +184,15 @@ enum Response {
     Linear,
 }
 
+/// So many channels are colours.
+const COLOURS: usize = 3;
 /// The signal is within the noise where the median is less than this many times the most negative value.
 const WITHIN_NOISE: f64 = 4.0;
 
 impl Response {
-    fn of(here: &[&Datum]) -> Self {
-        let within_noise = (0..3).any(|c| {
+    /// Of each channel. Colours are of one kind; of bands one may be dark where others are not.
+    fn of<const N: usize>(here: &[&Datum<N>]) -> [Self; N] {
+        let within_noise = |c: usize| {
             let values = here.iter().map(|d| d.value[c]);
             let lowest = values.clone().fold(f64::INFINITY, f64::min);
             // Without a negative one nothing needs sorting.
@@ -198,31 +201,32 @@ impl Response {
                 values.sort_by(f64::total_cmp);
                 values[values.len() / 2] < -WITHIN_NOISE * lowest
             }
-        });
-        if within_noise {
-            Response::Linear
-        } else {
-            Response::Logarithm
-        }
+        };
+        let within: [bool; N] = std::array::from_fn(within_noise);
+        let any = N <= COLOURS && within.contains(&true);
+        within.map(|within| match within || any {
+            true => Response::Linear,
+            false => Response::Logarithm,
+        })
     }
 }
 
 /// A BRDF fitted to few samples, to be evaluated anywhere.
-pub struct ScatteredFit {
+pub struct ScatteredFit<const N: usize = 3> {
     /// Places with a sample.
     measured: usize,
-    data: Vec<Datum>,
+    data: Vec<Datum<N>>,
     places: Places,
     choice: Choice,
 }
 
 /// Whether samples are few, and scattered: not the images of a camera, which see many directions at once.
-pub fn is_few(samples: &[Sample]) -> bool {
+pub fn is_few<const N: usize>(samples: &[Sample<N>]) -> bool {
     samples.len() <= 8 * FEW && !are_images(samples) && data::count_places(samples) <= FEW
 }
 
 /// Whether samples are the images of a camera, by their frames' numbers: more than a few samples a frame.
-pub fn are_images(samples: &[Sample]) -> bool {
+pub fn are_images<const N: usize>(samples: &[Sample<N>]) -> bool {
     let mut frames: Vec<u32> = samples.iter().map(|s| s.frame).collect();
     frames.retain(|frame| *frame != Sample::NO_FRAME);
     let framed = frames.len();
@@ -258,8 +262,10 @@ impl ScatteredFit {
         let data = Data::new(samples);
         (data.places.len() >= PLACES_MIN).then(|| Self::chosen(&data, Choice::of(settings)))
     }
+}
 
-    fn chosen(data: &Data, choice: Choice) -> Self {
+impl<const N: usize> ScatteredFit<N> {
+    fn chosen(data: &Data<N>, choice: Choice) -> Self {
         let merged = Merged::new(data, &choice.settings).data;
         Self {
             measured: data.places.len(),
@@ -269,10 +275,11 @@ impl ScatteredFit {
         }
     }
 
-    /// The same fit of other channels of these samples.
+    /// The same fit of other channels of these samples, which share what does not depend on values: neighbourhoods,
+    /// covariances and their factors.
     #[must_use]
-    pub fn of_channels(&self, samples: &[Sample]) -> Self {
-        Self::chosen(&Data::new(samples), self.choice.clone())
+    pub fn of_channels<const M: usize>(&self, samples: &[Sample<M>]) -> ScatteredFit<M> {
+        ScatteredFit::chosen(&Data::new(samples), self.choice.clone())
     }
 
     /// The settings, and why these.
@@ -286,22 +293,22 @@ impl ScatteredFit {
     }
 
     /// The value at a pair of directions per channel, positive and reciprocal, and its standard error.
-    pub fn at(&self, light: Direction, view: Direction) -> ([f64; 3], [f64; 3]) {
+    pub fn at(&self, light: Direction, view: Direction) -> ([f64; N], [f64; N]) {
         let predicted = self.predicted(light.to_vec3(), view.to_vec3());
         let factor = self.choice.error_factor;
-        let error = [0, 1, 2].map(|c| factor * predicted.relative[c] * predicted.value[c]);
+        let error = std::array::from_fn(|c| factor * predicted.relative[c] * predicted.value[c]);
         (predicted.value, error)
     }
 
     /// [`Self::at`] many pairs of light and view, by all threads.
-    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<([f64; 3], [f64; 3])> {
+    pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<([f64; N], [f64; N])> {
         let at = |(light, view): &(Direction, Direction)| self.at(*light, *view);
         pairs.par_iter().map(at).collect()
     }
 
     /// The values of all cells of a grid and their standard errors per channel. Positive, finite, exactly
     /// reciprocal, one value a pole.
-    pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
+    pub fn dense(&self, grid: Grid, with_errors: bool) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
         if self.choice.settings.symmetry.is_isotropic() {
             self.dense_by_table(grid, with_errors)
         } else {
@@ -309,7 +316,40 @@ impl ScatteredFit {
         }
     }
 
-    fn predicted(&self, light: Vec3, view: Vec3) -> Predicted {
+    /// The values of [`Self::dense`] of so many rings of lights (of one polar angle) at a time, or more where one is too
+    /// few: `take` gets the rings and the cells of their lights, a plane a channel, or one plane for all channels that are
+    /// alike.
+    ///
+    /// # Errors
+    /// What `take` returns.
+    pub fn by_rings<E>(
+        &self,
+        grid: Grid,
+        at_a_time: usize,
+        mut take: impl FnMut(Range<usize>, &[Vec<f32>]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let is_isotropic = self.choice.settings.symmetry.is_isotropic();
+        let table = is_isotropic.then(|| Table::new(self, grid, false));
+        for rings in patches::bands(grid, at_a_time) {
+            let planes = match &table {
+                Some(table) => table.spread(rings.clone(), self.channels(), |p, c| p.value[c]),
+                None => self.planes_by_cells(grid, rings.clone(), false).0,
+            };
+            take(rings, &planes)?;
+        }
+        Ok(())
+    }
+
+    /// How many channels differ: one where all are alike.
+    fn channels(&self) -> usize {
+        let is_grey = |v: &[f64; N]| v.iter().all(|x| *x == v[0]);
+        match self.data.iter().all(|d| is_grey(&d.value)) {
+            true => 1,
+            false => N,
+        }
+    }
+
+    fn predicted(&self, light: Vec3, view: Vec3) -> Predicted<N> {
         let settings = &self.choice.settings;
         let place = settings.coordinates.pair(light, view);
         let here = self.predicted_at(place);
@@ -319,7 +359,7 @@ impl ScatteredFit {
         preferred(&here, &self.predicted_at(exchanged(place)))
     }
 
-    fn predicted_at(&self, place: Pair) -> Predicted {
+    fn predicted_at(&self, place: Pair) -> Predicted<N> {
         let settings = &self.choice.settings;
         let near = self
             .places
@@ -330,8 +370,8 @@ impl ScatteredFit {
 
 /// A place's own prediction where data lie near it, and that of the reciprocal place where they lie nearer
 /// to that one: what data say that contradict reciprocity.
-fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
-    let variance = |p: &Predicted| p.relative.iter().map(|r| r * r).sum::<f64>().max(1e-30);
+fn preferred<const N: usize>(own: &Predicted<N>, reciprocal: &Predicted<N>) -> Predicted<N> {
+    let variance = |p: &Predicted<N>| p.relative.iter().map(|r| r * r).sum::<f64>().max(1e-30);
     let ratio = (variance(own) / (NEARER * variance(reciprocal))).powi(4);
     let share = if ratio.is_finite() {
         ratio / (1.0 + ratio)
@@ -339,7 +379,7 @@ fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
         1.0
     };
     let mut mean = *own;
-    for c in 0..3 {
+    for c in 0..N {
         let logs = [own, reciprocal].map(|p| p.value[c].natural_log());
         mean.value[c] = ((1.0 - share) * logs[0] + share * logs[1]).exponential();
         mean.relative[c] =
@@ -352,9 +392,9 @@ fn preferred(own: &Predicted, reciprocal: &Predicted) -> Predicted {
 const NEARER: f64 = 4.0;
 
 /// The mean of two of one value, weighted by their certainty.
-fn averaged(a: &Predicted, b: &Predicted) -> Predicted {
+fn averaged<const N: usize>(a: &Predicted<N>, b: &Predicted<N>) -> Predicted<N> {
     let mut mean = *a;
-    for c in 0..3 {
+    for c in 0..N {
         let [wa, wb] = [a, b].map(|p| 1.0 / p.relative[c].powi(2).max(1e-18));
         let share = wb / (wa + wb);
         let log = (1.0 - share) * a.value[c].natural_log() + share * b.value[c].natural_log();
@@ -756,5 +796,113 @@ mod tests {
         };
         assert!(is_few(&of_material(300, false, 1.0, 0.0)) && is_few(&framed(1)));
         assert!(!is_few(&framed(50)));
+    }
+
+    #[test]
+    fn cells_beyond_a_plane_of_symmetry_are_as_near_to_the_fit_as_those_whose_systems_they_have() {
+        let grid = Grid::with_step_deg(5.0).unwrap();
+        let plane = MirrorPlane::at_deg(22.8);
+        for symmetry in [
+            Symmetry::Bilateral(plane),
+            Symmetry::HalfTurnBilateral(plane),
+        ] {
+            let settings = Settings {
+                symmetry,
+                ..Settings::DEFAULT
+            };
+            let samples = of_material(3000, false, 1.5, 0.0);
+            let fit = ScatteredFit::with_settings(&samples, settings).unwrap();
+            let (dense, _) = fit.dense(grid, false);
+            let off = |cells: &quadratic::Cells| {
+                let [lights, views] = [0, 2].map(|axis| cells.directions(axis, grid, 0));
+                let all = lights
+                    .iter()
+                    .flat_map(|l| views.iter().map(move |v| (*l, *v)));
+                let off = all.step_by(17).map(|(l, v)| {
+                    let (at, _) = fit.at(grid.direction(l), grid.direction(v));
+                    (f64::from(dense.at(l, v)[1]) / at[1]).natural_log().powi(2)
+                });
+                off.collect::<Vec<f64>>()
+            };
+            let (mut own, mut beyond) = (Vec::new(), Vec::new());
+            for pair in patches::pairs(grid, symmetry, true) {
+                if let Some(cells) = pair.beyond {
+                    own.extend(off(&pair.cells));
+                    beyond.extend(off(&cells.cells));
+                }
+            }
+            let rms = [own, beyond].map(|off| (off.iter().sum::<f64>() / off.len() as f64).sqrt());
+            assert!(rms[1] < 1.1 * rms[0], "{symmetry}: {rms:?}");
+        }
+    }
+
+    /// The samples with other channels: each so many times the red one.
+    fn of_times<const N: usize>(samples: &[Sample], times: [f32; N]) -> Vec<Sample<N>> {
+        let with = |s: &Sample| s.with_values(times.map(|times| times * s.rgb[0]));
+        samples.iter().map(with).collect()
+    }
+
+    fn settings_of(symmetry: Symmetry) -> Settings {
+        Settings {
+            symmetry,
+            ..Settings::DEFAULT
+        }
+    }
+
+    #[test]
+    fn bands_of_one_factorisation_are_each_what_it_is_among_colours() {
+        let samples = of_material(300, false, 1.5, 0.0);
+        let fit = ScatteredFit::with_settings(&samples, settings_of(Symmetry::None)).unwrap();
+        let times = [1.0, 0.5, 2.0, 3.0, 0.7];
+        let bands = fit.of_channels(&of_times(&samples, times));
+        let colours = fit.of_channels(&of_times(&samples, [3.0, 0.7, 1.0]));
+        // One that is noise about zero leaves the others what they are.
+        let mut random = Random::new(6);
+        let mut dark = of_times(&samples, times);
+        for sample in &mut dark {
+            sample.rgb[1] = 1e-4 * random.normal() as f32;
+        }
+        let with_dark = fit.of_channels(&dark);
+        for _ in 0..20 {
+            let (light, view) = (direction(&mut random, false), direction(&mut random, false));
+            let (found, known) = (bands.at(light, view), colours.at(light, view));
+            for (band, colour) in [(3, 0), (4, 1), (0, 2)] {
+                assert!((found.0[band] / known.0[colour] - 1.0).abs() < 1e-12);
+                assert!((found.1[band] / known.1[colour] - 1.0).abs() < 1e-9);
+            }
+            let (beside_dark, _) = with_dark.at(light, view);
+            for band in [0, 2, 3, 4] {
+                assert!((beside_dark[band] / found.0[band] - 1.0).abs() < 1e-12);
+            }
+            assert!(beside_dark[1] > 0.0 && beside_dark[1] < 1e-3);
+        }
+    }
+
+    #[test]
+    fn cells_ring_by_ring_are_those_of_all_at_once() {
+        let grid = Grid::with_step_deg(5.0).unwrap();
+        let samples = of_material(400, false, 1.5, 0.0);
+        let samples = of_times(&samples, [1.0, 0.5, 2.0]);
+        let plane = MirrorPlane::at_deg(22.8);
+        for symmetry in [
+            Symmetry::None,
+            Symmetry::HalfTurnBilateral(plane),
+            Symmetry::Isotropic,
+        ] {
+            let fit = ScatteredFit::with_settings(&samples, settings_of(symmetry)).unwrap();
+            let (dense, _) = fit.dense(grid, false);
+            for at_a_time in [1, 5, 100] {
+                let mut planes = vec![Vec::new(); 3];
+                let taken = fit.by_rings(grid, at_a_time, |rings, some| {
+                    assert!(rings.len() <= at_a_time);
+                    for (plane, some) in planes.iter_mut().zip(some) {
+                        plane.extend_from_slice(some);
+                    }
+                    Ok::<(), ()>(())
+                });
+                assert_eq!(taken, Ok(()));
+                assert!(planes == dense.planes(), "{symmetry} {at_a_time}");
+            }
+        }
     }
 }

@@ -8,32 +8,36 @@ use pulp::{Arch, Simd, WithSimd};
 /// Data that are worked on at a time. Sums run in so many parts, which are added in one order: whatever the width of a
 /// processor's registers, the numbers are the same.
 const WIDTH: usize = 16;
+/// A system has at most so many times as many data.
+const SIDES: usize = 11;
 /// The polynomials hold up to this distance, in units of the kernel's range: data are rarely farther.
 const S_MAX: f64 = 0.75;
 /// What a covariance falls by is off by less than this: a few roundings of what is far below 1.
 const OFF: f64 = 6e-8;
 
 /// Data side by side: places in units of the kernel's range from a middle, and their weights, channel by channel.
-struct Side {
+struct Side<const N: usize> {
     at: [[f32; WIDTH]; 6],
-    weights: [[f32; WIDTH]; 3],
+    weights: [[f32; WIDTH]; N],
 }
 
 /// Places and weights of a system.
 ///
 /// Weights are of either sign, and their sum is nearly zero: so what counts is by how much covariances fall from 1, which
 /// single precision knows better than the covariances themselves.
-pub(super) struct Narrow {
+pub(super) struct Narrow<const N: usize = 3> {
     arch: Arch,
     scale: f64,
     polynomial: &'static [f32; 10],
     middle: Pair,
-    sides: Vec<Side>,
+    sides: Vec<Side<N>>,
     /// Sums of the weights.
-    totals: [f64; 3],
+    totals: [f64; N],
+    /// Channels that have weights.
+    channels: usize,
 }
 
-impl Narrow {
+impl<const N: usize> Narrow<N> {
     /// Of data at places, with weights channel by channel, for places within a distance from a middle; `None` where sums
     /// are not as near as is wanted.
     pub fn new<'a>(
@@ -50,11 +54,14 @@ impl Narrow {
             return None;
         }
         let (scale, many) = (covariance.scale, places.clone().count());
+        if many > SIDES * WIDTH {
+            return None;
+        }
         let empty = || Side {
             at: [[0.0; WIDTH]; 6],
-            weights: [[0.0; WIDTH]; 3],
+            weights: [[0.0; WIDTH]; N],
         };
-        let mut sides: Vec<Side> = (0..many.div_ceil(WIDTH)).map(|_| empty()).collect();
+        let mut sides: Vec<Side<N>> = (0..many.div_ceil(WIDTH)).map(|_| empty()).collect();
         for (k, place) in places.enumerate() {
             let off = [0, 1, 2, 3, 4, 5].map(|axis| place[axis] - middle[axis]);
             let far = off.iter().map(|x| x * x).sum::<f64>().sqrt() + within;
@@ -69,7 +76,8 @@ impl Narrow {
                 to[k % WIDTH] = weights[k] as f32;
             }
         }
-        let mut totals = [0.0; 3];
+        let mut totals = [0.0; N];
+        let channels = weights.clone().count();
         for (total, weights) in totals.iter_mut().zip(weights) {
             *total = weights.iter().sum();
         }
@@ -83,15 +91,16 @@ impl Narrow {
             middle,
             sides,
             totals,
+            channels,
         })
     }
 
     /// Sums of the covariances of a place with the data, by their weights: channel by channel.
-    pub fn sums(&self, place: &Pair) -> [f64; 3] {
+    pub fn sums(&self, place: &Pair) -> [f64; N] {
         let off = |axis: usize| self.scale * (place[axis] - self.middle[axis]);
         let at = [0, 1, 2, 3, 4, 5].map(|axis| off(axis) as f32);
         let fallen = self.arch.dispatch(Summed { narrow: self, at });
-        [0, 1, 2].map(|c| self.totals[c] + f64::from(fallen[c]))
+        std::array::from_fn(|c| self.totals[c] + f64::from(fallen[c]))
     }
 }
 
@@ -122,23 +131,23 @@ const MATERN: [f32; 10] = [
     -9.0 / 3_628_800.0,
 ];
 
-struct Summed<'a> {
-    narrow: &'a Narrow,
+struct Summed<'a, const N: usize> {
+    narrow: &'a Narrow<N>,
     at: [f32; 6],
 }
 
-impl WithSimd for Summed<'_> {
-    type Output = [f32; 3];
+impl<const N: usize> WithSimd for Summed<'_, N> {
+    type Output = [f32; N];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> [f32; 3] {
+    fn with_simd<S: Simd>(self, simd: S) -> [f32; N] {
         let Self { narrow, at } = self;
         let c = narrow.polynomial.map(|c| simd.splat_f32s(c));
         let at = at.map(|x| simd.splat_f32s(x));
-        let mut sums = [[0f32; WIDTH]; 3];
+        let mut sums = [[0f32; WIDTH]; N];
         for group in 0..WIDTH / S::F32_LANES {
-            let mut parts = [simd.splat_f32s(0.0); 3];
-            for side in &narrow.sides {
+            let mut all = [simd.splat_f32s(0.0); SIDES];
+            for (side, all) in narrow.sides.iter().zip(&mut all) {
                 let off = |axis: usize| {
                     let off = simd.sub_f32s(S::as_simd_f32s(&side.at[axis]).0[group], at[axis]);
                     simd.mul_f32s(off, off)
@@ -154,17 +163,18 @@ impl WithSimd for Summed<'_> {
                 let low = simd.add_f32s(two(0), simd.mul_f32s(two(2), s2));
                 let high = simd.add_f32s(two(4), simd.mul_f32s(two(6), s2));
                 let high = simd.add_f32s(high, simd.mul_f32s(two(8), s4));
-                let fallen = simd.mul_f32s(s, simd.add_f32s(low, simd.mul_f32s(high, s4)));
-                for (part, weights) in parts.iter_mut().zip(&side.weights) {
-                    let weights = S::as_simd_f32s(weights).0[group];
-                    *part = simd.add_f32s(*part, simd.mul_f32s(weights, fallen));
-                }
+                *all = simd.mul_f32s(s, simd.add_f32s(low, simd.mul_f32s(high, s4)));
             }
-            for (sums, part) in sums.iter_mut().zip(parts) {
+            for (c, sums) in sums.iter_mut().enumerate().take(narrow.channels) {
+                let mut part = simd.splat_f32s(0.0);
+                for (side, fallen) in narrow.sides.iter().zip(&all) {
+                    let weights = S::as_simd_f32s(&side.weights[c]).0[group];
+                    part = simd.add_f32s(part, simd.mul_f32s(weights, *fallen));
+                }
                 S::as_mut_simd_f32s(sums).0[group] = part;
             }
         }
-        for sums in &mut sums {
+        for sums in sums.iter_mut().take(narrow.channels) {
             let mut width = WIDTH / 2;
             while width > 0 {
                 for k in 0..width {
@@ -199,7 +209,7 @@ mod tests {
                     let weights = std::iter::once(&weights[..]);
                     let places = places.iter().copied();
                     let around = ([0.01; 6], within);
-                    Narrow::new(Arch::new(), covariance, places, weights, around, wanted)
+                    Narrow::<3>::new(Arch::new(), covariance, places, weights, around, wanted)
                 };
                 let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
                 assert!(narrow(0.5, 0.9 * OFF * length).is_none());

@@ -56,7 +56,7 @@ impl Subset {
             return f64::NEG_INFINITY;
         };
         let (mut ones, mut y) = (vec![1.0; self.values.len()], self.values.clone());
-        factor.forward(self.arch, [&mut ones[..], &mut y[..]]);
+        factor.forward(self.arch, &mut [&mut ones[..], &mut y[..]]);
         let ones2 = dot(self.arch, &ones, &ones);
         let along = dot(self.arch, &y, &ones);
         let squares = (dot(self.arch, &y, &y) - along * along / ones2).max(1e-300);

@@ -39,7 +39,7 @@ const SAME2: f64 = 1e-12;
 
 impl Places {
     /// With all images of the data: for many searches.
-    pub fn new(data: &[Datum], settings: &Settings) -> Self {
+    pub fn new<const N: usize>(data: &[Datum<N>], settings: &Settings) -> Self {
         let images = image_count(settings);
         let held = (0u32..).zip(data).flat_map(|(number, datum)| {
             let pair = settings.coordinates.pair(datum.light, datum.view);
@@ -50,7 +50,7 @@ impl Places {
 
     /// Without their images: for few searches, with any settings that have these coordinates, and turn as these do or do
     /// not.
-    pub fn without_images(data: &[Datum], settings: &Settings) -> Self {
+    pub fn without_images<const N: usize>(data: &[Datum<N>], settings: &Settings) -> Self {
         let held = (0u32..)
             .zip(data)
             .map(|(number, datum)| (settings.coordinates.pair(datum.light, datum.view), number));

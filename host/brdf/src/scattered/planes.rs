@@ -2,24 +2,34 @@
 
 use super::quadratic::Cells;
 use crate::grid::Grid;
-use crate::interpolate::planes::spread_poles;
 use std::sync::{Mutex, PoisonError};
 
 /// Planes that many threads write to, each row (the views of one direction of light) by one at a time.
-pub(super) struct Rows<'a>(Vec<Vec<Mutex<&'a mut [f32]>>>);
+pub(super) struct Rows<'a> {
+    /// The number of the first.
+    first: usize,
+    planes: Vec<Vec<Mutex<&'a mut [f32]>>>,
+}
 
 impl<'a> Rows<'a> {
-    pub fn of(grid: Grid, planes: &'a mut [Vec<f32>]) -> Self {
+    /// Those of planes that begin with the lights of a ring: no other row is stored.
+    pub fn of(grid: Grid, ring: usize, planes: &'a mut [Vec<f32>]) -> Self {
         let rows = |plane: &'a mut Vec<f32>| {
             let rows = plane.chunks_mut(grid.n_directions());
             rows.map(Mutex::new).collect()
         };
-        Self(planes.iter_mut().map(rows).collect())
+        Self {
+            first: ring * grid.n_phi(),
+            planes: planes.iter_mut().map(rows).collect(),
+        }
     }
 
     /// Stores a row of cells at runs of its columns.
     fn put(&self, channel: usize, row: usize, runs: &[Run], cells: &[f32]) {
-        let row = &self.0[channel][row];
+        let rows = &self.planes[channel];
+        let Some(row) = row.checked_sub(self.first).and_then(|row| rows.get(row)) else {
+            return;
+        };
         // A thread that panicked left whole numbers.
         let mut row = row.lock().unwrap_or_else(PoisonError::into_inner);
         for run in runs {
@@ -28,22 +38,20 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Zeros for all cells, a plane a channel.
-pub(super) fn planes_of(grid: Grid, channels: usize) -> Vec<Vec<f32>> {
-    (0..channels).map(|_| vec![0.0; grid.n_cells()]).collect()
+/// Zeros for all cells of lights on some rings, a plane a channel.
+pub(super) fn planes_of(grid: Grid, rings: usize, channels: usize) -> Vec<Vec<f32>> {
+    let count = rings * grid.n_phi() * grid.n_directions();
+    (0..channels).map(|_| vec![0.0; count]).collect()
 }
 
-/// All three planes: of one channel, that one in each. A pole's value at azimuth 0 becomes that at all azimuths.
-pub(super) fn three(grid: Grid, mut planes: Vec<Vec<f32>>) -> [Vec<f32>; 3] {
-    for plane in &mut planes {
-        spread_poles(grid, plane);
+/// The planes of all channels: of one that stands for all, that one in each.
+pub(super) fn of_all<const N: usize>(mut planes: Vec<Vec<f32>>) -> [Vec<f32>; N] {
+    planes.resize_with(planes.len().max(1), Vec::new);
+    while planes.len() < N {
+        planes.push(planes[0].clone());
     }
     let mut planes = planes.into_iter();
-    let first = planes.next().unwrap_or_default();
-    match (planes.next(), planes.next()) {
-        (Some(second), Some(third)) => [first, second, third],
-        _ => [first.clone(), first.clone(), first],
-    }
+    std::array::from_fn(|_| planes.next().unwrap_or_default())
 }
 
 /// Directions that follow each other: from which number in the patch, the number of the first, and how many.
@@ -180,7 +188,7 @@ mod tests {
             is_turned: true,
         };
         for pair in [pair([3, 3, 2, 6], false), pair([3, 3, 3, 3], true)] {
-            let mut planes = planes_of(grid, 1);
+            let mut planes = planes_of(grid, grid.n_theta(), 1);
             let mut block = Block::default();
             block.clear(&pair, 1);
             let [lights, views] = [0, 2].map(|axis| pair.directions(axis, grid, 0));
@@ -192,7 +200,7 @@ mod tests {
                     .flat_map(|l| views.iter().map(|v| value(*l, *v)));
                 block.put(&pair, &half, 0, &values.collect::<Vec<f64>>());
             }
-            block.store(&pair, grid, &Rows::of(grid, &mut planes));
+            block.store(&pair, grid, &Rows::of(grid, 0, &mut planes));
             let turned = |d: &usize| d / 12 * 12 + (d + 6) % 12;
             for l in &lights {
                 for v in &views {

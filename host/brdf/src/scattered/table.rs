@@ -3,12 +3,14 @@
 use super::ScatteredFit;
 use super::local::{Local, Predicted};
 use super::places::{distance2, radius_of};
+use super::planes::{of_all, planes_of};
 use crate::dense::DenseBrdf;
 use crate::direction::Direction;
 use crate::grid::Grid;
 use crate::interpolate::coordinates::Pair;
 use crate::symmetry::Symmetry;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Cells whose middle is within this share of the radius of a neighbourhood of each other share the system.
 const SHARED: f64 = 0.5;
@@ -25,29 +27,31 @@ struct Part {
 }
 
 /// Values of an isotropic BRDF by polar angles and the difference of azimuths.
-struct Table {
+pub(super) struct Table<const N: usize> {
     grid: Grid,
-    cells: Vec<Predicted>,
+    cells: Vec<Predicted<N>>,
 }
 
-impl ScatteredFit {
+impl<const N: usize> ScatteredFit<N> {
     /// [`Self::dense`] of a fit with the symmetry [`Turns`](crate::Symmetry::Turns) or
     /// [`Isotropic`](crate::Symmetry::Isotropic).
     pub(super) fn dense_by_table(
         &self,
         grid: Grid,
         with_errors: bool,
-    ) -> (DenseBrdf, Option<[Vec<f32>; 3]>) {
+    ) -> (DenseBrdf<N>, Option<[Vec<f32>; N]>) {
         let table = Table::new(self, grid, with_errors);
         let factor = self.choice.error_factor;
-        let values = table.spread(|p, c| p.value[c]);
-        let errors = with_errors.then(|| table.spread(|p, c| factor * p.relative[c] * p.value[c]));
-        (DenseBrdf::from_planes(grid, values), errors)
+        let (all, channels) = (0..grid.n_theta(), self.channels());
+        let values = table.spread(all.clone(), channels, |p, c| p.value[c]);
+        let error = |p: &Predicted<N>, c: usize| factor * p.relative[c] * p.value[c];
+        let errors = with_errors.then(|| of_all(table.spread(all, channels, error)));
+        (DenseBrdf::from_planes(grid, of_all(values)), errors)
     }
 }
 
-impl Table {
-    fn new(fit: &ScatteredFit, grid: Grid, with_errors: bool) -> Self {
+impl<const N: usize> Table<N> {
+    pub fn new(fit: &ScatteredFit<N>, grid: Grid, with_errors: bool) -> Self {
         let size = [grid.n_theta(), grid.n_theta(), grid.n_phi()];
         // Where both sides of the plane of incidence are alike, one is fitted.
         let is_mirrored = fit.choice.settings.symmetry == Symmetry::Isotropic;
@@ -71,7 +75,7 @@ impl Table {
             // What contradicts reciprocity is averaged by its errors.
             with_errors: with_errors || !fit.choice.settings.reciprocal_data,
         };
-        let found: Vec<Vec<(usize, Predicted)>> = parts
+        let found: Vec<Vec<(usize, Predicted<N>)>> = parts
             .into_par_iter()
             .with_max_len(1)
             .map(|part| {
@@ -81,9 +85,9 @@ impl Table {
             })
             .collect();
         let nothing = Predicted {
-            value: [0.0; 3],
-            relative: [0.0; 3],
-            noise: [0.0; 3],
+            value: [0.0; N],
+            relative: [0.0; N],
+            noise: [0.0; N],
         };
         let mut cells = vec![nothing; size.iter().product()];
         for (cell, predicted) in found.into_iter().flatten() {
@@ -126,17 +130,23 @@ impl Table {
         self
     }
 
-    fn spread(&self, of: impl Fn(&Predicted, usize) -> f64 + Sync) -> [Vec<f32>; 3] {
+    /// What is `of` the cells of so many channels, of lights on some rings, a plane a channel.
+    pub fn spread(
+        &self,
+        rings: Range<usize>,
+        channels: usize,
+        of: impl Fn(&Predicted<N>, usize) -> f64 + Sync,
+    ) -> Vec<Vec<f32>> {
         let (grid, n_phi) = (self.grid, self.grid.n_phi());
         let n = grid.n_directions();
-        let mut planes = [(); 3].map(|()| vec![0f32; grid.n_cells()]);
+        let mut planes = planes_of(grid, rings.len(), channels);
         for (c, plane) in planes.iter_mut().enumerate() {
             let narrow: Vec<f32> = self.cells.iter().map(|p| of(p, c) as f32).collect();
             plane
                 .par_chunks_mut(n)
                 .enumerate()
                 .for_each(|(light, row)| {
-                    let (i, phi_i) = (light / n_phi, light % n_phi);
+                    let (i, phi_i) = (rings.start + light / n_phi, light % n_phi);
                     for (v, ring) in row.chunks_mut(n_phi).enumerate() {
                         let start = Self::cell(grid, [i, v, 0]);
                         let cells = &narrow[start..start + n_phi];
@@ -153,13 +163,13 @@ impl Table {
     }
 }
 
-struct Filler<'a> {
-    fit: &'a ScatteredFit,
+struct Filler<'a, const N: usize> {
+    fit: &'a ScatteredFit<N>,
     grid: Grid,
     with_errors: bool,
 }
 
-impl Filler<'_> {
+impl<const N: usize> Filler<'_, N> {
     fn place(&self, [i, v, d]: [f64; 3]) -> Pair {
         let step = self.grid.step_deg();
         let light = Direction::from_deg(i * step, 0.0).to_vec3();
@@ -169,7 +179,7 @@ impl Filler<'_> {
 
     /// Appends the cells of a part, each by its number: with one system where the part is small against
     /// the neighbourhood, else half by half.
-    fn fill(&self, part: Part, out: &mut Vec<(usize, Predicted)>) {
+    fn fill(&self, part: Part, out: &mut Vec<(usize, Predicted<N>)>) {
         let fit = self.fit;
         let settings = &fit.choice.settings;
         if settings.reciprocal_data && part.start[0] >= part.end[1] {
@@ -219,7 +229,7 @@ impl Filler<'_> {
                     let place = self.place([i as f64, v as f64, d as f64]);
                     let place = settings.symmetry.aligned(place, middle);
                     out.push((
-                        Table::cell(self.grid, [i, v, d]),
+                        Table::<N>::cell(self.grid, [i, v, d]),
                         local.at_with(&place, self.with_errors, &mut work),
                     ));
                 }

@@ -120,10 +120,16 @@ impl Correlations {
 
     /// The factor of `K + nugget · noise`; `None` where that is singular to this precision.
     pub fn factor(&self, arch: Arch, nugget: f64, noise: &Noise) -> Option<Factor> {
-        let mut l = self.k.clone();
-        add_noise(self.n, &mut l, nugget, noise);
-        arch.dispatch(Factored(self.n, &mut l))
-            .then_some(Factor { n: self.n, l })
+        let k = self.k.clone();
+        Self { n: self.n, k }.into_factor(arch, nugget, noise)
+    }
+
+    /// The same in their own memory.
+    pub fn into_factor(self, arch: Arch, nugget: f64, noise: &Noise) -> Option<Factor> {
+        let Self { n, k: mut l } = self;
+        add_noise(n, &mut l, nugget, noise);
+        arch.dispatch(Factored(n, &mut l))
+            .then_some(Factor { n, l })
     }
 }
 
@@ -151,17 +157,17 @@ impl Factor {
     }
 
     /// `x = L⁻¹ x` of each.
-    pub fn forward<const R: usize>(&self, arch: Arch, x: [&mut [f64]; R]) {
+    pub fn forward(&self, arch: Arch, x: &mut [&mut [f64]]) {
         arch.dispatch(Forward(self, x));
     }
 
     /// `x = L⁻ᵀ x` of each.
-    pub fn backward<const R: usize>(&self, arch: Arch, mut x: [&mut Vec<f64>; R]) {
-        for x in &mut x {
+    pub fn backward(&self, arch: Arch, x: &mut [Vec<f64>]) {
+        for x in x.iter_mut() {
             x.resize(padded(self.n), 0.0);
         }
-        arch.dispatch(Backward(self, x.each_mut().map(|x| &mut x[..])));
-        for x in &mut x {
+        arch.dispatch(Backward(self, x));
+        for x in x {
             x.truncate(self.n);
         }
     }
@@ -403,9 +409,9 @@ fn factor_panel<S: Simd>(simd: S, panel: &mut [f64], j: usize, rows: usize) -> b
     true
 }
 
-struct Forward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
+struct Forward<'a, 'b>(&'a Factor, &'a mut [&'b mut [f64]]);
 
-impl<const R: usize> WithSimd for Forward<'_, R> {
+impl WithSimd for Forward<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -415,8 +421,7 @@ impl<const R: usize> WithSimd for Forward<'_, R> {
         for (j, column) in l.chunks_exact(rows).enumerate() {
             // What is above the diagonal is zero.
             let from = j / WIDTH * WIDTH;
-            for r in 0..R {
-                let x = &mut *all[r];
+            for x in all.iter_mut() {
                 let first = x[j] / column[j];
                 subtract(simd, &mut x[from..], &column[from..*n], first);
                 x[j] = first;
@@ -425,9 +430,9 @@ impl<const R: usize> WithSimd for Forward<'_, R> {
     }
 }
 
-struct Backward<'a, const R: usize>(&'a Factor, [&'a mut [f64]; R]);
+struct Backward<'a>(&'a Factor, &'a mut [Vec<f64>]);
 
-impl<const R: usize> WithSimd for Backward<'_, R> {
+impl WithSimd for Backward<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -437,8 +442,7 @@ impl<const R: usize> WithSimd for Backward<'_, R> {
         // Those of columns side by side wait for each other only in what they have in common.
         for start in (0..*n).step_by(WIDTH).rev() {
             let end = (start + WIDTH).min(*n);
-            for r in 0..R {
-                let x = &mut *all[r];
+            for x in all.iter_mut() {
                 let mut below = [0.0; WIDTH];
                 for (j, below) in (start..end).zip(&mut below) {
                     let column = &l[j * rows..(j + 1) * rows];
@@ -643,12 +647,14 @@ mod tests {
                 let correlations = Correlations::new(Arch::new(), &at, covariance);
                 let factor = correlations.factor(Arch::new(), 1e-3, &noise).unwrap();
                 let mut x = y.clone();
-                factor.forward(Arch::new(), [&mut x[..]]);
-                let mut narrow = x.clone();
-                narrow.resize(padded(n), 0.0);
-                Backward(&factor, [&mut narrow[..]]).with_simd(pulp::Scalar);
-                factor.backward(Arch::new(), [&mut x]);
-                assert!(x == narrow[..n]);
+                factor.forward(Arch::new(), &mut [&mut x[..]]);
+                let mut narrow = [x.clone()];
+                narrow[0].resize(padded(n), 0.0);
+                Backward(&factor, &mut narrow).with_simd(pulp::Scalar);
+                let mut solved = [x];
+                factor.backward(Arch::new(), &mut solved);
+                let [x] = solved;
+                assert!(x == narrow[0][..n]);
                 let mut k = Vec::new();
                 for i in 0..n {
                     covariances(Arch::new(), &at, covariance, &at.place(i), &mut k);

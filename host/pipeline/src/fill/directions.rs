@@ -1,6 +1,6 @@
 //! A fit of samples that is asked at any directions, without a grid in between.
 
-use super::groups::{groups, spread_over};
+use super::groups::{groups, spread_over, stand_for_themselves};
 use crate::Error;
 use crate::budget::{Equation, PLACES, Part, SidesOfSamples, Slant, places, shape};
 use crate::warnings;
@@ -15,11 +15,31 @@ const SAMPLES_AT_MOST: usize = 1_000_000;
 /// A fit of samples of any channels, which has a value at any directions.
 pub struct FitOfSamples {
     channels: Channels,
-    /// Fits of some of the channels, each with the numbers of its three.
-    groups: Vec<([usize; 3], ScatteredFit)>,
+    groups: Groups,
     choice: Choice,
     /// Where the samples lie; empty where values follow from their images by a symmetry too.
-    measured: Vec<(Direction, Direction)>,
+    measured: Vec<Pair>,
+}
+
+/// A pair of light and view.
+type Pair = (Direction, Direction);
+/// The measurement equation, and of each pair the share of its data that lie there and not at the reciprocal pair.
+type Sided<'a> = (&'a Equation, &'a [f64]);
+/// A fit of some of the channels, with their numbers.
+type Group<const N: usize> = ([usize; N], ScatteredFit<N>);
+
+/// Fits of as many channels as share a factorisation.
+enum Groups {
+    OfThree(Vec<Group<3>>),
+    OfMany(Vec<Group<31>>),
+}
+
+fn at_all<const N: usize>((channels, fit): &Group<N>, pairs: &[Pair], values: &mut [Vec<f32>]) {
+    for (values, (value, _)) in values.iter_mut().zip(fit.at_all(pairs)) {
+        for (channel, value) in channels.iter().zip(value) {
+            values[*channel] = value as f32;
+        }
+    }
 }
 
 impl FitOfSamples {
@@ -79,16 +99,10 @@ impl FitOfSamples {
             Symmetry::None => spread.iter().map(directions_of).collect(),
             _ => Vec::new(),
         };
-        let mut of_all = groups::<3>(n);
-        let groups = if of_all == [spread_over(n)] {
-            of_all
-                .pop()
-                .map(|channels| (channels, fit))
-                .into_iter()
-                .collect()
-        } else {
-            let of_group = |channels| (channels, fit.of_channels(&samples.of_channels(channels)));
-            of_all.into_iter().map(of_group).collect()
+        let groups = match n {
+            _ if stand_for_themselves(n) => Groups::OfThree(vec![(spread_over(n), fit)]),
+            10.. => Groups::OfMany(fits_of(&fit, &samples)),
+            _ => Groups::OfThree(fits_of(&fit, &samples)),
         };
         let fit = Self {
             channels: samples.channels().clone(),
@@ -120,30 +134,18 @@ impl FitOfSamples {
         let sides = equation
             .as_ref()
             .and_then(|_| SidesOfSamples::of(self.measured.iter().copied()));
-        let there = |pair: &(Direction, Direction)| {
-            sides.as_ref().map_or(0.5, |of| of.there(pair.0, pair.1))
-        };
+        let there = |pair: &Pair| sides.as_ref().map_or(0.5, |of| of.there(pair.0, pair.1));
         let asked: Vec<_> = pairs.iter().flat_map(|(i, v)| places(*i, *v)).collect();
         let mut all = vec![vec![[0.0f32; 2]; self.channels.count()]; pairs.len()];
-        for (channels, fit) in &self.groups {
-            let found = fit.at_all(&asked);
-            let (found, _) = found.as_chunks::<PLACES>();
-            for ((about, out), (light, view)) in found.iter().zip(&mut all).zip(pairs) {
-                let there = there(&(*light, *view));
-                for (c, channel) in channels.iter().enumerate() {
-                    let (value, noise) = (about[0].0[c], about[0].1[c]);
-                    let known = equation.as_ref().map_or(0.0, |equation| {
-                        let shape = shape(&about.map(|(value, _)| value[c]));
-                        let (light, view) = (Slant::of(*light), Slant::of(*view));
-                        let effects = equation.of_reciprocal((&light, &view), &shape, there);
-                        value
-                            * effects
-                                .u(Part::Direction)
-                                .hypotenuse(effects.u(Part::Scale))
-                    });
-                    out[*channel] = [value as f32, noise.hypotenuse(known) as f32];
-                }
-            }
+        let there: Vec<f64> = pairs.iter().map(there).collect();
+        let given = (
+            pairs,
+            &asked[..],
+            equation.as_ref().map(|e| (e, &there[..])),
+        );
+        match &self.groups {
+            Groups::OfThree(groups) => groups.iter().for_each(|g| known(g, given, &mut all)),
+            Groups::OfMany(groups) => groups.iter().for_each(|g| known(g, given, &mut all)),
         }
         all
     }
@@ -151,18 +153,47 @@ impl FitOfSamples {
     /// The value of each channel at many pairs of light and view, by all threads.
     pub fn at_all(&self, pairs: &[(Direction, Direction)]) -> Vec<Vec<f32>> {
         let mut values = vec![vec![0.0f32; self.channels.count()]; pairs.len()];
-        for (channels, fit) in &self.groups {
-            for (values, (value, _)) in values.iter_mut().zip(fit.at_all(pairs)) {
-                for (channel, value) in channels.iter().zip(value) {
-                    values[*channel] = value as f32;
-                }
-            }
+        match &self.groups {
+            Groups::OfThree(groups) => groups.iter().for_each(|g| at_all(g, pairs, &mut values)),
+            Groups::OfMany(groups) => groups.iter().for_each(|g| at_all(g, pairs, &mut values)),
         }
         values
     }
 }
 
-fn directions_of(sample: &Sample) -> (Direction, Direction) {
+/// Values and standard uncertainties of a group's channels at pairs, by those at the places around them.
+fn known<const N: usize>(
+    (channels, fit): &Group<N>,
+    (pairs, asked, equation): (&[Pair], &[Pair], Option<Sided<'_>>),
+    all: &mut [Vec<[f32; 2]>],
+) {
+    let found = fit.at_all(asked);
+    let (found, _) = found.as_chunks::<PLACES>();
+    for (k, ((about, out), (light, view))) in found.iter().zip(all).zip(pairs).enumerate() {
+        for (c, channel) in channels.iter().enumerate() {
+            let (value, noise) = (about[0].0[c], about[0].1[c]);
+            let known = equation.map_or(0.0, |(equation, there)| {
+                let shape = shape(&about.map(|(value, _)| value[c]));
+                let (light, view) = (Slant::of(*light), Slant::of(*view));
+                let effects = equation.of_reciprocal((&light, &view), &shape, there[k]);
+                let scale = effects.u(Part::Scale);
+                value * effects.u(Part::Direction).hypotenuse(scale)
+            });
+            out[*channel] = [value as f32, noise.hypotenuse(known) as f32];
+        }
+    }
+}
+
+/// The fit of all channels, group by group.
+fn fits_of<const N: usize>(fit: &ScatteredFit, samples: &SampleValues) -> Vec<Group<N>> {
+    let of_group = |channels| (channels, fit.of_channels(&samples.of_channels(channels)));
+    groups(samples.channels().count())
+        .into_iter()
+        .map(of_group)
+        .collect()
+}
+
+fn directions_of(sample: &Sample) -> Pair {
     (
         Direction::from_deg(sample.theta_i_deg.into(), sample.phi_i_deg.into()),
         Direction::from_deg(sample.theta_v_deg.into(), sample.phi_v_deg.into()),

@@ -1,7 +1,7 @@
 //! A fill in memory: a plane a channel, group by group.
 
 use super::blocks::{Start, fill_bins_of};
-use super::groups::{groups, groups_from_middle, spread_over};
+use super::groups::{groups, groups_from_middle, spread_over, stand_for_themselves};
 use super::prepared::Prepared;
 use super::symmetry::fit_of_others;
 use crate::Error;
@@ -34,19 +34,27 @@ impl Planes {
         }
     }
 
-    /// A fit of few samples, three channels at a time.
+    /// A fit of few samples, as many channels at a time as share a factorisation. One channel or three need no samples:
+    /// the fit is theirs.
     pub fn fill_by_fit(&mut self, fit: &ScatteredFit, samples: &SampleValues) {
         let n = self.values.len();
-        for channels in groups::<3>(n) {
-            let (dense, errors) = if channels == spread_over(n) {
-                fit.dense(self.grid, self.with_errors)
-            } else {
-                let samples = samples.of_channels(channels);
-                let fit = fit_of_others(fit, &samples, self.grid);
-                fit.dense(self.grid, self.with_errors)
-            };
-            self.take(channels, dense.into_planes(), errors);
+        match n {
+            _ if stand_for_themselves(n) => self.fill_fit(spread_over(n), fit),
+            10.. => self.fill_fits::<31>(fit, samples),
+            _ => self.fill_fits::<3>(fit, samples),
         }
+    }
+
+    fn fill_fits<const N: usize>(&mut self, fit: &ScatteredFit, samples: &SampleValues) {
+        for channels in groups::<N>(self.values.len()) {
+            let samples = samples.of_channels(channels);
+            self.fill_fit(channels, &fit_of_others(fit, &samples, self.grid));
+        }
+    }
+
+    fn fill_fit<const N: usize>(&mut self, channels: [usize; N], fit: &ScatteredFit<N>) {
+        let (dense, errors) = fit.dense(self.grid, self.with_errors);
+        self.take(channels, dense.into_planes(), errors);
     }
 
     /// Blocks, as many channels at a time as share a factorisation. Returns the settings. One channel or three

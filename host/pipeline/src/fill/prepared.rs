@@ -10,7 +10,7 @@ use crate::progress::{Progress, Step, step};
 use crate::provenance::{Provenance, of_this_program};
 use crate::warnings::{self, Isotropy};
 use gonia_brdf::interpolate::OriginCounts;
-use gonia_brdf::scattered::{FEW_OF_BANDS, Reason, ScatteredFit, is_few};
+use gonia_brdf::scattered::{Reason, ScatteredFit, is_few};
 use gonia_brdf::{Bin, Bins, Grid, Symmetry};
 use gonia_formats::fit_source::{FIT_SYMMETRY, fit_symmetry};
 use gonia_rig::{Remark, SampleValues};
@@ -69,9 +69,7 @@ impl Prepared {
             && !is_few(&samples)
             && is_seen_from_all_around(&samples);
         let fit = fit.filter(|fit| {
-            let is_few = all.channels().count() <= 3 || fit.places() <= FEW_OF_BANDS;
-            let is_few = is_few && !options.asks_for_blocks();
-            let takes_place = !turns && (symmetry.is_isotropic() || is_few);
+            let takes_place = !turns && (symmetry.is_isotropic() || !options.asks_for_blocks());
             let choice = fit.choice();
             let is_odd = choice.contradicted_by.is_some() || choice.plane_undetermined;
             if takes_place || turns || is_odd {

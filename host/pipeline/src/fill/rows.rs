@@ -4,7 +4,7 @@
 use super::FillAccount;
 use super::blocks::{chosen, sorted};
 use super::groups::{groups, groups_from_middle, spread_over, stand_for_themselves};
-use super::options::FillOptions;
+use super::options::{CELLS_IN_MEMORY, FillOptions};
 use super::planes::bins_of;
 use super::prepared::Prepared;
 use super::symmetry::fit_of_others;
@@ -126,6 +126,8 @@ impl<E: Into<Error>> From<E> for Stopped {
 
 /// Takes of a row of light the values of a group's channels.
 type TakeGroup<'a> = dyn Fn(usize, &Fresh, &[&[f32]]) -> Result<(), Stopped> + Sync + 'a;
+/// Takes how much is done, and says whether to go on.
+type Share<'a> = gonia_brdf::progress::Progress<'a>;
 
 impl ToRows<'_> {
     /// Writes the file whole from what `make` gives; returns the settings, and the albedo of all channels.
@@ -167,41 +169,67 @@ impl ToRows<'_> {
         Ok((settings, sums.finish(self.prepared.highest_deg())))
     }
 
-    /// Three channels at a time are in memory.
+    /// Of as many channels as share a factorisation, some rings of lights at a time are in memory.
     fn write_fit(
         &self,
         fit: &ScatteredFit,
         progress: &Progress<'_>,
     ) -> Result<(String, DirectionalAlbedo), Error> {
-        let (n, side) = (self.channels.count(), self.grid.n_directions());
-        let mut written = vec![false; n];
-        let groups = groups::<3>(n);
+        let n = self.channels.count();
         self.write(fit.choice().settings.to_string(), |take| {
             step(progress, Step::InterpolatingAndWriting, |share| {
-                for (k, channels) in groups.iter().enumerate() {
-                    if share(k as f64 / groups.len() as f64).is_break() {
-                        return Err(Error::Cancelled.into());
+                let mut written = vec![false; n];
+                match n {
+                    _ if stand_for_themselves(n) => {
+                        self.write_rings(spread_over(n), fit, &mut written, (take, share))
                     }
-                    let fresh = Fresh::of(channels, &mut written);
-                    let dense = if *channels == spread_over(n) {
-                        fit.dense(self.grid, false).0
-                    } else {
-                        let samples = self.samples.of_channels(*channels);
-                        fit_of_others(fit, &samples, self.grid)
-                            .dense(self.grid, false)
-                            .0
-                    };
-                    for light in 0..side {
-                        let cells = light * side..(light + 1) * side;
-                        take(
-                            light,
-                            &fresh,
-                            &dense.planes().each_ref().map(|plane| &plane[cells.clone()]),
-                        )?;
-                    }
+                    10.. => self.write_fits::<31>(fit, &mut written, (take, share)),
+                    _ => self.write_fits::<3>(fit, &mut written, (take, share)),
                 }
-                Ok(())
             })
+        })
+    }
+
+    fn write_fits<const N: usize>(
+        &self,
+        fit: &ScatteredFit,
+        written: &mut [bool],
+        (take, share): (&TakeGroup<'_>, &Share<'_>),
+    ) -> Result<(), Stopped> {
+        for channels in groups::<N>(written.len()) {
+            let samples = self.samples.of_channels(channels);
+            let fit = fit_of_others(fit, &samples, self.grid);
+            self.write_rings(channels, &fit, written, (take, share))?;
+        }
+        Ok(())
+    }
+
+    fn write_rings<const N: usize>(
+        &self,
+        channels: [usize; N],
+        fit: &ScatteredFit<N>,
+        written: &mut [bool],
+        (take, share): (&TakeGroup<'_>, &Share<'_>),
+    ) -> Result<(), Stopped> {
+        let (grid, side) = (self.grid, self.grid.n_directions());
+        let before = written.iter().filter(|written| **written).count() as f64;
+        let fresh = Fresh::of(&channels, written);
+        let at_a_time = 3 * CELLS_IN_MEMORY / (grid.n_phi() * side * N);
+        fit.by_rings(grid, at_a_time, |rings, planes| {
+            let done = rings.start as f64 / grid.n_theta() as f64;
+            let done = before + done * fresh.channels.len() as f64;
+            if share(done / written.len() as f64).is_break() {
+                return Err(Error::Cancelled.into());
+            }
+            let first = rings.start * grid.n_phi();
+            for light in first..rings.end * grid.n_phi() {
+                let cells = (light - first) * side..(light - first + 1) * side;
+                // One plane stands for all channels where these are alike.
+                let row = |c: usize| &planes[c.min(planes.len() - 1)][cells.clone()];
+                let group: [&[f32]; N] = std::array::from_fn(row);
+                take(light, &fresh, &group)?;
+            }
+            Ok(())
         })
     }
 

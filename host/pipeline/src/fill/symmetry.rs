@@ -32,7 +32,11 @@ pub(super) fn scattered_fit(
 }
 
 /// The fit of other channels of the samples that a fit is of.
-pub(super) fn fit_of_others(fit: &ScatteredFit, samples: &[Sample], grid: Grid) -> ScatteredFit {
+pub(super) fn fit_of_others<const N: usize>(
+    fit: &ScatteredFit,
+    samples: &[Sample<N>],
+    grid: Grid,
+) -> ScatteredFit<N> {
     if is_few(samples) {
         fit.of_channels(samples)
     } else {
@@ -93,13 +97,13 @@ pub(super) fn symmetry_of_many(
 
 /// Of many samples of an isotropic material, the medians of those that share a cell when all are turned to
 /// one azimuth of light.
-fn few_of(samples: &[Sample], grid: Grid) -> Vec<Sample> {
+fn few_of<const N: usize>(samples: &[Sample<N>], grid: Grid) -> Vec<Sample<N>> {
     let turned = samples.iter().map(|s| Sample {
         phi_i_deg: 0.0,
         phi_v_deg: (s.phi_v_deg - s.phi_i_deg).rem_euclid(360.0),
         ..*s
     });
-    let bins = Bins::new(grid, &turned.collect::<Vec<Sample>>());
+    let bins = Bins::new(grid, &turned.collect::<Vec<Sample<N>>>());
     let bins = bins.bins().iter();
     bins.map(|bin| {
         let direction = |v: [f32; 3]| Direction::from_vec3(v.map(f64::from));
