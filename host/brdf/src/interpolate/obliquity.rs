@@ -66,12 +66,13 @@ impl Obliquity {
                 n = rest.len();
             }
             let (zone, others) = rest.split_at(n);
+            let factor = factor_of(zone, noise).factor(1.0) * of_few_groups(zone);
             let weights = zone.iter().map(|of| of.first.weight);
             let sum: f32 = weights.clone().sum();
             let logs = zone.iter().zip(weights).map(|(of, w)| w * log(of));
             zones.push(Zone {
                 log_product: logs.sum::<f32>() / sum,
-                log_factor: (factor_of(zone, noise) * of_few_groups(zone)).natural_log(),
+                log_factor: factor.natural_log(),
                 // A standard deviation is known twice as well as its square.
                 weight: groups_of(zone) as f32 / (0.5 * PERCENTILE_SPREAD).powi(2),
             });
