@@ -174,9 +174,14 @@ pub(super) fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &Bi
     let by_noise = NOISE_SPREAD * noise_share;
     let uncertainty = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
     let weight = 1.0 / (1.0 + uncertainty);
+    // What the number of tests leaves open is drawn to the usual one of the variances as they come here, what noise hides to that
+    // of the block's own.
+    let few = PERCENTILE_SPREAD * PERCENTILE_SPREAD / count.max(1.0);
+    let by_few = few / (by_chance * by_chance + by_noise * by_noise);
+    let open = (1.0 - weight) * USUAL_FACTOR;
     Squared {
-        own: weight * square.max(0.0),
-        usual: (1.0 - weight) * USUAL_FACTOR,
+        own: weight * square.max(0.0) + by_few * open,
+        usual: (1.0 - by_few) * open,
     }
 }
 
