@@ -12,6 +12,7 @@ use gonia_formats::samples::read_channels;
 use gonia_pipeline::budget::budget_in;
 use gonia_pipeline::provenance::Provenance;
 use gonia_pipeline::{Behind, FitOfSamples};
+use gonia_report::files::ERRORS;
 use gonia_rig::{Channels, Remark};
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
@@ -34,7 +35,7 @@ pub struct Query {
     #[arg(long)]
     grid: bool,
     /// Add the standard uncertainty of each value (u, k = 1) and the expanded one (U, k = 2): of samples by the fit
-    /// and what they say of their rig, of a dense BRDF from the file that --error names
+    /// and what they say of their rig, of a dense BRDF from the file that --error names or error.exr beside it
     #[arg(long)]
     uncertainty: bool,
     /// Of a dense BRDF: its error bars, as gonia fill --error wrote them; asks for uncertainties too
@@ -114,20 +115,27 @@ impl Query {
 
     /// The error bars of a dense BRDF, where they are asked for.
     fn errors(&self) -> Result<Option<DenseLookup>> {
-        let Some(path) = &self.error else {
-            if self.uncertainty {
-                bail!(
-                    "--uncertainty: {} holds no uncertainties; give the file that gonia fill --error wrote with it by --error ERR.exr",
-                    self.dense.display()
-                );
+        let path = match &self.error {
+            Some(path) => path.clone(),
+            None if !self.uncertainty => return Ok(None),
+            None => {
+                let beside = self.dense.with_file_name(ERRORS);
+                if !beside.exists() {
+                    bail!(
+                        "--uncertainty: {} holds no uncertainties, and no {ERRORS} lies beside it; give the file that gonia fill --error wrote with it by --error ERR.exr",
+                        self.dense.display()
+                    );
+                }
+                errln!("uncertainties: {}", beside.display());
+                beside
             }
-            return Ok(None);
         };
+        let path = &path;
         let errors = DenseLookup::open(path)?;
         let of = (errors.grid(), errors.channels(), errors.provenance());
         if !are_errors_of(of, &read_dense_channels(&self.dense)?) {
             bail!(
-                "--error {}: is not of the values of {}; give the error bars that were written with it (gonia fill --error)",
+                "{}: is not of the values of {}; give by --error the error bars that were written with it (gonia fill --error)",
                 path.display(),
                 self.dense.display()
             );

@@ -400,7 +400,7 @@ fn a_grid_has_them_too(dir: &Path, scale: &Path, asked: &str, query: Asks) {
     assert!(printed.contains("u (k = 1), interior"), "{printed}");
     assert!(printed.contains("reference 5.00 %"), "{printed}");
     let (by_grid, _) = query(&["query", text(&dense), "--error", text(&error)]);
-    for [value, u] in by_grid {
+    for [value, u] in by_grid.iter().copied() {
         assert!(u > 0.05 * value && u < 0.2 * value, "{value} {u}");
     }
     assert!(printed.contains("albedo and U (k = 2)"), "{printed}");
@@ -431,6 +431,11 @@ fn a_grid_has_them_too(dir: &Path, scale: &Path, asked: &str, query: Asks) {
         said.contains("--error ERR.exr") && said.lines().count() == 1,
         "{said}"
     );
+    // One that lies beside it by the usual name needs no words.
+    std::fs::copy(&error, dir.join("error.exr")).unwrap();
+    let (beside, said) = query(&["query", text(&dense), "--uncertainty", "--grid"]);
+    assert_eq!(beside, by_grid);
+    assert!(said.contains("error.exr"), "{said}");
 }
 
 #[test]

@@ -200,5 +200,18 @@ mod tests {
             let error = read_text(&text).unwrap_err().to_string();
             assert!(error.contains("key reference.reflectance:"), "{error}");
         }
+        // Words that name the key and what to give.
+        let text = format!("{}\n[reference]\nreflectance = \"white\"\n", paper_text());
+        let error = read_text(&text).unwrap_err().to_string();
+        assert!(error.contains("reflectance: give one number"), "{error}");
+    }
+
+    #[test]
+    fn one_reflectance_is_that_of_all_channels() {
+        let with = |rho: &str| format!("{}\n[reference]\nreflectance = {rho}\n", paper_text());
+        assert_eq!(
+            read_text(&with("0.98")).unwrap().reference,
+            read_text(&with("[0.98, 0.98, 0.98]")).unwrap().reference
+        );
     }
 }

@@ -6,6 +6,7 @@
 //! the move is the estimate of the arms' error.
 
 mod elsewhere;
+mod estimate;
 mod line_points;
 mod mark;
 mod prior;
@@ -13,35 +14,19 @@ mod prior;
 use crate::IdealLight;
 use crate::hough::{LineEdges, StripLine, strongest_line};
 use crate::lines::{LineStrip, SIDES, rows_of_strips};
-use crate::refine::{FoundLine, LineFit, Starts, fit_lines};
+use crate::refine::{LineFit, Starts, fit_lines};
 use crate::turn::Turn;
+use estimate::{Estimate, Estimator, MAX_SURPRISE, MIN_LINES};
 use gonia_brdf::Elementary;
 use gonia_brdf::{Direction, Pose};
 use gonia_rig::{CameraModel, CameraShift, Frame, Homography, Rig, Target};
-use nalgebra::{DMatrix, DVector};
 use prior::{ARM_DEG, ImagePrior};
 use std::ops::Range;
 
-/// What the pinhole model itself is trusted to, pixels at 1000 pixels' width, and never better than
-/// this many pixels.
-const MODEL_PX_PER_1000: f64 = 0.05;
-const MODEL_PX: f64 = 0.02;
-/// Floor of a line's own standard error, pixels.
-const LINE_FLOOR_PX: f64 = 0.003;
-/// With less than a pixel of desk between line and material each can stand in for the other: this
-/// many pixels, times 1/gap⁴ − 1, come on top.
-const CROWDED_PX: f64 = 0.04;
 /// Lines that the moved camera misses by more than this share of the width are not the target's.
 const MISFIT_WIDTHS: f64 = 6e-4;
-/// Nothing is believed of a frame in which fewer lines are seen.
-const MIN_LINES: usize = 3;
-/// Sum of squared standard deviations (of fourteen numbers with six unknowns; 8 is usual) above
-/// which something is wrong.
-const MAX_SURPRISE: f64 = 25.0;
 /// Nor are lines that want roll, shift or magnification this many standard deviations off.
 const MAX_DEVIATION: f64 = 6.0;
-/// Standard deviation of an arm that does not hold its 0.03°.
-const LOOSE_ARM_DEG: f64 = 0.5;
 /// Nor are lines that want the arm this far from its reading.
 const MAX_OFFSET_DEG: f64 = 1.0;
 /// Size of Hough's bins: see [`Registrar::with_hough_resolution`].
@@ -332,12 +317,22 @@ impl Registrar {
             by.shift_px[1],
             by.log_scale,
         ];
-        let scale = self.prior_scale(&self.trust(ARM_DEG));
+        let scale = self
+            .estimator()
+            .prior_scale(&self.estimator().trust(ARM_DEG));
         OffPlace {
             px: (squares.iter().sum::<f64>() / 4.0).sqrt(),
             deviations: (moves.iter().zip(scale))
                 .map(|(by, sd)| by.abs() / sd)
                 .fold(0.0, f64::max),
+        }
+    }
+
+    fn estimator(&self) -> Estimator<'_> {
+        Estimator {
+            camera: &self.camera,
+            target: &self.target,
+            prior: &self.prior,
         }
     }
 
@@ -383,7 +378,12 @@ impl Registrar {
         let strips = self.strips(shot, predicted, NEAR_WIDTHS * width + 4.0);
         let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
         if fit.lines.iter().all(Option::is_some) {
-            let estimate = self.estimate(view, &strips, &fit.lines, &self.trust(ARM_DEG));
+            let estimate = self.estimator().estimate(
+                view,
+                &strips,
+                &fit.lines,
+                &self.estimator().trust(ARM_DEG),
+            );
             // All four lines where a trusted camera sees them: no need to look elsewhere.
             if estimate.surprise <= MAX_SURPRISE {
                 return self.settle(view, &strips, fit, estimate);
@@ -429,16 +429,21 @@ impl Registrar {
         let found = fit.lines.iter().flatten().count();
         if found < MIN_LINES {
             // Even those few must be where the pose has them, or they are something else.
-            let estimate = self.estimate(view, strips, &fit.lines, &self.trust(ARM_DEG));
+            let estimate = self.estimator().estimate(
+                view,
+                strips,
+                &fit.lines,
+                &self.estimator().trust(ARM_DEG),
+            );
             if found > 0 && estimate.surprise > MAX_SURPRISE {
-                return Err(Failure::new(estimate.wrong_layout(), &fit));
+                return Err(Failure::new(wrong_layout(&estimate), &fit));
             }
             return Err(Failure::new(
                 RegistrationFailure::LinesMissing { found },
                 &fit,
             ));
         }
-        let estimate = self.best_estimate(view, strips, &fit.lines);
+        let estimate = self.estimator().best(view, strips, &fit.lines);
         self.settle(view, strips, fit, estimate)
     }
 
@@ -456,7 +461,7 @@ impl Registrar {
             // Three lines may not overrule the rig.
             && (estimate.lines_used > MIN_LINES || estimate.surprise <= MAX_SURPRISE);
         if !fits {
-            return Err(Failure::new(estimate.wrong_layout(), &fit));
+            return Err(Failure::new(wrong_layout(&estimate), &fit));
         }
         let shift = estimate.shift;
         let offset_deg = shift
@@ -470,7 +475,7 @@ impl Registrar {
             ));
         }
         let Some(homography) = self.homography(strips, &estimate.lines) else {
-            return Err(Failure::new(estimate.wrong_layout(), &fit));
+            return Err(Failure::new(wrong_layout(&estimate), &fit));
         };
         let furthest_px = estimate.lines.iter().map(|l| l.abs()).fold(0.0, f64::max);
         Ok(Solution {
@@ -481,173 +486,6 @@ impl Registrar {
             lines_found: estimate.lines_used,
             furthest_px,
         })
-    }
-
-    /// The estimate that believes most: all lines and the arm's reading; all lines and an arm that
-    /// is off; all lines but one, where that one contradicts the rest because something else was
-    /// taken for it; at last all lines, and a layout that is not quite what the rig says.
-    fn best_estimate(
-        &self,
-        view: Direction,
-        strips: &[LineStrip; 4],
-        lines: &[Option<FoundLine>; 4],
-    ) -> Estimate {
-        let trusting = self.estimate(view, strips, lines, &self.trust(ARM_DEG));
-        if trusting.surprise <= MAX_SURPRISE {
-            return trusting;
-        }
-        let arm_off = self.estimate(view, strips, lines, &self.trust(LOOSE_ARM_DEG));
-        if arm_off.surprise <= MAX_SURPRISE {
-            return arm_off;
-        }
-        if arm_off.lines_used == MIN_LINES {
-            return arm_off;
-        }
-        let without = (0..4).map(|i| {
-            let mut rest = *lines;
-            rest[i] = None;
-            self.estimate(view, strips, &rest, &self.trust(ARM_DEG))
-        });
-        let best = without.min_by(|a, b| a.surprise.total_cmp(&b.surprise));
-        if let Some(best) = best.filter(|e| e.surprise <= MAX_SURPRISE) {
-            return best;
-        }
-        let mut trust = self.trust(LOOSE_ARM_DEG);
-        trust.model_px = trust.model_px.max(arm_off.misfit_px);
-        self.estimate(view, strips, lines, &trust)
-    }
-
-    fn trust(&self, arm_deg: f64) -> Trust {
-        let width = self.camera.size_px[0] as f64;
-        Trust {
-            arm_deg,
-            roll_deg: self.prior.roll_deg,
-            shift_widths: self.prior.shift_widths,
-            ln_scale: self.prior.ln_scale,
-            model_px: (MODEL_PX_PER_1000 * 1e-3 * width).max(MODEL_PX),
-        }
-    }
-
-    /// The camera, moved from its reading, that fits the lines best, and the lines as they follow
-    /// from it and from their own measurement: offsets and slopes of the four lines are
-    /// δ = δ(p) + e, with Gaussian priors on the camera's moves p and on the model's error e.
-    fn estimate(
-        &self,
-        view: Direction,
-        strips: &[LineStrip; 4],
-        lines: &[Option<FoundLine>; 4],
-        trust: &Trust,
-    ) -> Estimate {
-        let tau = trust.model_px;
-        let found: Vec<usize> = (0..8).filter(|k| lines[k / 2].is_some()).collect();
-        let n = found.len();
-        let mut measured = DVector::zeros(n);
-        let mut covariance = DMatrix::from_diagonal_element(n, n, tau * tau);
-        for (row, pair) in found.chunks_exact(2).enumerate() {
-            let Some(line) = &lines[pair[0] / 2] else {
-                continue;
-            };
-            measured[2 * row] = line.line.offset;
-            measured[2 * row + 1] = line.line.slope;
-            let own = inverse_2x2(line.information);
-            for r in 0..2 {
-                for c in 0..2 {
-                    covariance[(2 * row + r, 2 * row + c)] += own[r][c];
-                }
-                covariance[(2 * row + r, 2 * row + r)] += self.line_variance(&strips[pair[0] / 2]);
-            }
-        }
-        let failed = Estimate {
-            shift: CameraShift::default(),
-            lines: [0.0; 8],
-            lines_used: n / 2,
-            surprise: f64::INFINITY,
-            misfit_px: f64::NAN,
-            camera_deviation: f64::NAN,
-        };
-        let Some(weight) = covariance.cholesky().map(|c| c.inverse()) else {
-            return failed;
-        };
-        let scale = self.prior_scale(trust);
-        let model = |p: &DVector<f64>| self.line_places(view, shift_from(p, &scale), strips);
-        let mut p = DVector::zeros(6);
-        let mut places = model(&p);
-        for _ in 0..3 {
-            let mut jacobian = DMatrix::zeros(n, 6);
-            for k in 0..6 {
-                let step = 1e-2;
-                let mut q = p.clone();
-                q[k] += step;
-                let moved = model(&q);
-                for (row, i) in found.iter().enumerate() {
-                    jacobian[(row, k)] = (moved[*i] - places[*i]) / step;
-                }
-            }
-            let residual = DVector::from_fn(n, |row, _| measured[row] - places[found[row]]);
-            let normal = jacobian.transpose() * &weight * &jacobian + DMatrix::identity(6, 6);
-            let right = jacobian.transpose() * &weight * residual - &p;
-            let Some(factor) = normal.cholesky() else {
-                return failed;
-            };
-            p += factor.solve(&right);
-            places = model(&p);
-        }
-        let residual = DVector::from_fn(n, |row, _| measured[row] - places[found[row]]);
-        let correction = &weight * &residual * (tau * tau);
-        let mut lines = places;
-        for (row, i) in found.iter().enumerate() {
-            lines[*i] += correction[row];
-        }
-        Estimate {
-            shift: shift_from(&p, &scale),
-            lines,
-            lines_used: n / 2,
-            surprise: (residual.transpose() * &weight * &residual)[0] + p.norm_squared(),
-            misfit_px: residual.norm() / (n as f64).sqrt(),
-            camera_deviation: p.rows(2, 4).amax(),
-        }
-    }
-
-    /// What a line's place is trusted to at best, px².
-    fn line_variance(&self, strip: &LineStrip) -> f64 {
-        let gap_mm = self.target.line_offset_mm
-            - self.target.material_half_mm
-            - 0.5 * self.target.line_width_mm;
-        let gap_px = (gap_mm * strip.px_per_mm()).max(1e-3);
-        let crowded = CROWDED_PX * (gap_px.powi(-4) - 1.0).max(0.0);
-        LINE_FLOOR_PX.powi(2) + crowded * crowded
-    }
-
-    fn prior_scale(&self, trust: &Trust) -> [f64; 6] {
-        let shift = trust.shift_widths * self.camera.size_px[0] as f64;
-        [
-            trust.arm_deg.to_radians(),
-            trust.arm_deg.to_radians(),
-            trust.roll_deg.to_radians(),
-            shift,
-            shift,
-            trust.ln_scale,
-        ]
-    }
-
-    /// Offsets and slopes of the four lines, in their strips, for a moved camera.
-    fn line_places(
-        &self,
-        view: Direction,
-        shift: CameraShift,
-        strips: &[LineStrip; 4],
-    ) -> [f64; 8] {
-        let map = self.camera.predict(view, shift);
-        let mut places = [0.0; 8];
-        for (i, side) in SIDES.iter().enumerate() {
-            let [(s0, t0), (s1, t1)] = side
-                .ends_mm(self.target.line_offset_mm)
-                .map(|end| strips[i].place(map.apply(end)));
-            let slope = (t1 - t0) / (s1 - s0);
-            places[2 * i] = t0 - slope * s0;
-            places[2 * i + 1] = slope;
-        }
-        places
     }
 
     /// The homography through the crossings of four lines given by offset and slope.
@@ -708,49 +546,10 @@ impl Failure {
     }
 }
 
-struct Estimate {
-    shift: CameraShift,
-    /// Offset and slope of each line.
-    lines: [f64; 8],
-    lines_used: usize,
-    /// Sum of squared deviations from the priors and the measured lines, in standard deviations.
-    surprise: f64,
-    /// RMS distance of the measured lines from the moved camera's.
-    misfit_px: f64,
-    /// The largest of roll, shift and magnification, in standard deviations of its prior.
-    camera_deviation: f64,
-}
-
-/// How far reading and model are believed.
-struct Trust {
-    /// Standard deviation of the arm's reading, degrees.
-    arm_deg: f64,
-    /// Standard deviation of the camera's roll, degrees.
-    roll_deg: f64,
-    /// Standard deviation of the image's shift, in frame widths.
-    shift_widths: f64,
-    /// Standard deviation of ln magnification.
-    ln_scale: f64,
-    /// Standard deviation of the model's lines, pixels.
-    model_px: f64,
-}
-
-impl Estimate {
-    fn wrong_layout(&self) -> RegistrationFailure {
-        RegistrationFailure::WrongLayout {
-            misfit_px: self.misfit_px,
-            deviation: self.camera_deviation,
-        }
-    }
-}
-
-fn shift_from(p: &DVector<f64>, scale: &[f64; 6]) -> CameraShift {
-    CameraShift {
-        theta: p[0] * scale[0],
-        phi: p[1] * scale[1],
-        roll: p[2] * scale[2],
-        shift_px: [p[3] * scale[3], p[4] * scale[4]],
-        log_scale: p[5] * scale[5],
+fn wrong_layout(estimate: &Estimate) -> RegistrationFailure {
+    RegistrationFailure::WrongLayout {
+        misfit_px: estimate.misfit_px,
+        deviation: estimate.camera_deviation,
     }
 }
 
@@ -758,14 +557,6 @@ fn scatter(fit: &LineFit) -> f64 {
     let found: Vec<f64> = fit.lines.iter().flatten().map(|l| l.scatter_px).collect();
     let sum: f64 = found.iter().map(|s| s * s).sum();
     (sum / found.len().max(1) as f64).sqrt()
-}
-
-fn inverse_2x2(m: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    let det = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).max(f64::MIN_POSITIVE);
-    [
-        [m[1][1] / det, -m[0][1] / det],
-        [-m[1][0] / det, m[0][0] / det],
-    ]
 }
 
 /// Where two lines, each through two points, cross. `None` for parallel ones.

@@ -74,11 +74,33 @@ pub enum ReflectanceTable {
     ByPose(Vec<(Pose, [f64; 3])>),
 }
 
+/// A reflectance that all channels share, or one for each.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "reflectance: give one number, or three of them as [red, green, blue]"
+)]
+enum OneOrThree {
+    One(f64),
+    Three([f64; 3]),
+}
+
+fn one_or_three<'de, D: Deserializer<'de>>(of: D) -> Result<Option<[f64; 3]>, D::Error> {
+    OneOrThree::deserialize(of).map(|read| match read {
+        OneOrThree::One(rho) => Some([rho; 3]),
+        OneOrThree::Three(rho) => Some(rho),
+    })
+}
+
 /// The keys of `[reference]`.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ReferenceKeys {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "one_or_three",
+        skip_serializing_if = "Option::is_none"
+    )]
     reflectance: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     table: Option<String>,

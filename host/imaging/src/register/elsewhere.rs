@@ -1,10 +1,8 @@
 //! A target that is not where its pose puts it: where else it is, and what that says of the frame or the rig.
 
+use super::estimate::{Estimate, MAX_SURPRISE, MIN_LINES, Trust};
 use super::prior::ARM_DEG;
-use super::{
-    Estimate, MAX_SURPRISE, MIN_LINES, NEAR_WIDTHS, Registrar, RegistrationFailure, SEARCH_WIDTHS,
-    Shot, Trust,
-};
+use super::{NEAR_WIDTHS, Registrar, RegistrationFailure, SEARCH_WIDTHS, Shot};
 use crate::hough::LineEdges;
 use crate::lines::LineStrip;
 use crate::refine::{LineFit, Starts, fit_lines};
@@ -86,7 +84,8 @@ impl Registrar {
             // All of them, where a trusted camera sees them: fewer may be others' that happen to fit.
             lines.iter().all(Option::is_some)
                 && self
-                    .estimate(shot.view, &strips, &lines, &self.trust(ARM_DEG))
+                    .estimator()
+                    .estimate(shot.view, &strips, &lines, &self.estimator().trust(ARM_DEG))
                     .surprise
                     <= MAX_SURPRISE
         })
@@ -103,7 +102,7 @@ impl Registrar {
         let trust = Trust {
             shift_widths: within_widths,
             roll_deg: LOOSE_ROLL_DEG,
-            ..self.trust(ARM_DEG)
+            ..self.estimator().trust(ARM_DEG)
         };
         let moved = |guess: CameraShift| CameraShift {
             shift_px: guess.shift_px,
@@ -145,11 +144,11 @@ impl Registrar {
             if some.iter().flatten().count() < MIN_LINES {
                 return None;
             }
-            let guess = taken(self.estimate(view, &strips, &some, trust).shift);
+            let guess = taken(self.estimator().estimate(view, &strips, &some, trust).shift);
             let there = self.camera.predict(view, guess);
             let strips = self.strips(shot, &there, NEAR_WIDTHS * width + 4.0);
             let fit = fit_lines(&strips, &Starts::Predicted, &self.target);
-            let estimate = self.estimate(view, &strips, &fit.lines, trust);
+            let estimate = self.estimator().estimate(view, &strips, &fit.lines, trust);
             let fits = fit.lines.iter().all(Option::is_some) && estimate.surprise <= MAX_SURPRISE;
             fits.then_some(Elsewhere {
                 strips,

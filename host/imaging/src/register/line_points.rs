@@ -2,7 +2,8 @@
 //! far off.
 
 use super::elsewhere::Elsewhere;
-use super::{MODEL_PX, NEAR_WIDTHS, Registrar, Trust};
+use super::estimate::{MODEL_PX, Trust};
+use super::{NEAR_WIDTHS, Registrar};
 use crate::hough::LineEdges;
 use crate::lines::SIDES;
 use crate::refine::{Starts, fit_lines, pieces};
@@ -69,7 +70,7 @@ impl Registrar {
         let mut points = Vec::new();
         for ((side, strip), line) in SIDES.iter().zip(&strips).zip(&fit.lines) {
             let Some(line) = line else { continue };
-            let floor = self.line_variance(strip);
+            let floor = self.estimator().line_variance(strip);
             for piece in pieces(strip, line.line, fit.sigma_px, PIECES) {
                 points.push(LinePoint {
                     axis: side.axis,
