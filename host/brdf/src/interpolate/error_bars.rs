@@ -13,7 +13,7 @@ use super::block::kernel::{AnyKernel, NewBlock};
 use super::cross_validation::{Fold, MeanPrediction, Prediction, TESTS_MIN};
 use super::data::Data;
 use super::error_factor::{
-    BinNoise, Residual, TESTS_OF_CLASS, USUAL_FACTOR, factor_of, of_few_groups, size,
+    BinNoise, Residual, Squared, TESTS_OF_CLASS, factor_of, of_few_groups, size,
 };
 use super::obliquity::Obliquity;
 use crate::bins::Bin;
@@ -75,8 +75,8 @@ pub struct Calibration {
 struct Classes {
     /// Upper limits of the guessed standard deviation, ascending, of all classes but the last.
     limits: Vec<f32>,
-    /// By what the guess is multiplied.
-    factors: Vec<f32>,
+    /// By the square of what the guess is multiplied.
+    factors: Vec<Squared>,
 }
 
 impl Calibration {
@@ -118,7 +118,7 @@ impl Calibration {
             }
         }
         let mut calibration = Self {
-            parts: [(); 3].map(|()| Classes::new::<N>(&[], &noise, &obliquity)),
+            parts: [(); 3].map(|()| Classes::new::<N>(&[], &noise)),
             bright,
             obliquity,
             noise,
@@ -128,8 +128,8 @@ impl Calibration {
             let of_part = |m: &&MeanPrediction<N>| calibration.part(m.first.log) == part;
             let own: Vec<&MeanPrediction<N>> = all.iter().copied().filter(of_part).collect();
             calibration.parts[part] = match own.len() >= TESTS_OF_CLASS {
-                true => Classes::new(&own, &noise, &obliquity),
-                false => Classes::of_rare(&own, &Classes::new(&all, &noise, &obliquity), &noise),
+                true => Classes::new(&own, &noise),
+                false => Classes::of_rare(&own, &Classes::new(&all, &noise), &noise),
             };
         }
         calibration
@@ -160,7 +160,8 @@ impl Calibration {
         variance: [f32; N],
     ) -> [f32; N] {
         let oblique = self.obliquity.factor(light, view);
-        let factor = oblique * self.parts[self.part(log)].factor(oblique * size(variance));
+        let square = self.parts[self.part(log)].square(oblique * size(variance));
+        let factor = square.factor(oblique * oblique);
         variance.map(|v| factor * v.max(0.0).sqrt())
     }
 
@@ -182,11 +183,7 @@ impl Calibration {
 }
 
 impl Classes {
-    fn new<const N: usize>(
-        means: &[&MeanPrediction<N>],
-        noise: &BinNoise,
-        obliquity: &Obliquity,
-    ) -> Self {
+    fn new<const N: usize>(means: &[&MeanPrediction<N>], noise: &BinNoise) -> Self {
         let size = |m: &MeanPrediction<N>| size(m.first.variance);
         let mut sorted: Vec<&MeanPrediction<N>> = means.to_vec();
         sorted.sort_by(|a, b| size(a).total_cmp(&size(b)));
@@ -203,22 +200,23 @@ impl Classes {
             }
             let (class, others) = rest.split_at(n);
             limits.extend(class.last().map(|last| size(last)));
-            // The usual factor is that of the blocks' own variances, which are multiplied here.
-            let usual = USUAL_FACTOR * USUAL_FACTOR / obliquity.mean_square(class);
-            factors.push(factor_of(class, noise, usual) * of_few_groups(class));
+            factors.push(factor_of(class, noise).widened(of_few_groups(class)));
             rest = others;
         }
         limits.pop();
         // Errors of a frame come together, so that few frames make a class: what its neighbours say
         // steadies it.
-        let squares = factors.clone();
-        let square = |k: usize| squares[k.min(squares.len() - 1)].powi(2);
+        let found = factors.clone();
+        let at = |k: usize| found[k.min(found.len() - 1)];
         for (k, factor) in factors.iter_mut().enumerate() {
-            let around = square(k.saturating_sub(1)) + 2.0 * square(k) + square(k + 1);
-            *factor = (0.25 * around).sqrt();
+            let around = [at(k.saturating_sub(1)), at(k), at(k), at(k + 1)];
+            *factor = Squared {
+                own: 0.25 * around.iter().map(|of| of.own).sum::<f32>(),
+                usual: 0.25 * around.iter().map(|of| of.usual).sum::<f32>(),
+            };
         }
         if factors.is_empty() {
-            factors.push(USUAL_FACTOR);
+            factors.push(Squared::USUAL);
         }
         Self { limits, factors }
     }
@@ -236,18 +234,18 @@ impl Classes {
             .collect();
         let own = weighted_quantile(&mut squares, 0.95);
         let own = own.unwrap_or(0.0).max(0.0).sqrt();
-        let widest = others
-            .factors
-            .iter()
-            .copied()
-            .fold(own * of_few_groups(means), f32::max);
+        let others = others.factors.iter().map(|of| of.factor(1.0));
+        let widest = others.fold(own * of_few_groups(means), f32::max);
         Self {
             limits: Vec::new(),
-            factors: vec![widest],
+            factors: vec![Squared {
+                own: widest * widest,
+                usual: 0.0,
+            }],
         }
     }
 
-    fn factor(&self, size: f32) -> f32 {
+    fn square(&self, size: f32) -> Squared {
         let class = self.limits.partition_point(|limit| *limit < size);
         self.factors[class.min(self.factors.len() - 1)]
     }

@@ -8,9 +8,9 @@ use crate::quantile::{quantile, weighted_quantile};
 
 /// Half the width of a 95 % interval, in standard errors of a normal distribution.
 pub const Z95: f32 = 1.96;
-/// The factor where noise alone makes the error: what the block itself says …
-pub(super) const USUAL_FACTOR: f32 = 1.0;
-/// … give or take this share of its square.
+/// The square of the factor where noise alone makes the error: what the block itself says …
+const USUAL_FACTOR: f32 = 1.0;
+/// … give or take this share.
 const USUAL_SPREAD: f32 = 0.5;
 /// Standard deviation of a 95th percentile of squares of normal values over their 95th percentile,
 /// times the root of their number: `2 √(0.05 · 0.95) / (1.96 · 2 φ(1.96))`, φ the normal density.
@@ -46,7 +46,7 @@ impl BinNoise {
                     Residual::new(p.residual[c], (p.variance[c], stated.of(p.bin, c)), 1.0)
                 })
             })
-            .map(|r| (r.noise, USUAL_FACTOR.powi(2) * r.variance, r.limit))
+            .map(|r| (r.noise, USUAL_FACTOR * r.variance, r.limit))
             .filter(|(noise, error, _)| *error < NOISE_ALONE * noise)
             .map(|(noise, error, limit)| (limit - error) / noise)
             .collect();
@@ -120,28 +120,52 @@ impl Residual {
     }
 }
 
+/// The square of a factor: the share of it that residuals show, and the rest, which is the usual one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Squared {
+    pub own: f32,
+    pub usual: f32,
+}
+
+impl Squared {
+    /// Of no residuals.
+    pub const USUAL: Self = Self {
+        own: 0.0,
+        usual: USUAL_FACTOR,
+    };
+
+    /// The factor itself, where the residuals' variances were multiplied by a square that another one's is: where noise hides
+    /// the error, a block's own variance stands as it is.
+    pub fn factor(self, square: f32) -> f32 {
+        (self.own * square + self.usual).sqrt()
+    }
+
+    /// So many times as large a factor.
+    pub fn widened(self, by: f32) -> Self {
+        Self {
+            own: by * by * self.own,
+            usual: by * by * self.usual,
+        }
+    }
+}
+
 /// The factor with which 95 % of the residuals lie within 1.96 standard errors: of each residual the
 /// square of the factor that just reaches it, and of these the 95th percentile, each by how many left-out bins it stands
 /// for (bins that were measured bright are tested more often: unweighted, those that are predicted bright and are not
 /// would count too little); then the mean of that
 /// and of the usual one, weighted by their uncertainties. Of residuals that are nearly all noise, the
 /// percentile says nothing.
-/// `usual` is the square of the usual one, in the unit of the variances.
-pub(super) fn factor_of<const N: usize>(
-    class: &[&MeanPrediction<N>],
-    noise: &BinNoise,
-    usual: f32,
-) -> f32 {
+pub(super) fn factor_of<const N: usize>(class: &[&MeanPrediction<N>], noise: &BinNoise) -> Squared {
     let all: Vec<Residual> = class
         .iter()
         .flat_map(|mean| Residual::of_mean(mean, noise))
         .collect();
     let mut squares: Vec<(f32, f32)> = all.iter().map(|r| (r.beyond_noise(), r.weight)).collect();
     let Some(square) = weighted_quantile(&mut squares, 0.95) else {
-        return usual.sqrt();
+        return Squared::USUAL;
     };
     let sum = |of: fn(&Residual) -> f32| all.iter().map(|r| r.weight * of(r)).sum::<f32>();
-    let noise_share = sum(|r| r.noise) / (sum(|r| r.variance) * square.max(usual));
+    let noise_share = sum(|r| r.noise) / (sum(|r| r.variance) * square.max(USUAL_FACTOR));
     // The channels of a bin share their error: they count as one. Unequal weights count as fewer equal ones.
     let weights = class.iter().map(|mean| mean.first.weight);
     let (sum, squares) = weights.fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
@@ -150,7 +174,15 @@ pub(super) fn factor_of<const N: usize>(
     let by_noise = NOISE_SPREAD * noise_share;
     let uncertainty = (by_chance * by_chance + by_noise * by_noise) / (USUAL_SPREAD * USUAL_SPREAD);
     let weight = 1.0 / (1.0 + uncertainty);
-    (weight * square.max(0.0) + (1.0 - weight) * usual).sqrt()
+    // What the number of tests leaves open is drawn to the usual one of the variances as they come here, what noise hides to that
+    // of the block's own.
+    let few = PERCENTILE_SPREAD * PERCENTILE_SPREAD / count.max(1.0);
+    let by_few = few / (by_chance * by_chance + by_noise * by_noise);
+    let open = (1.0 - weight) * USUAL_FACTOR;
+    Squared {
+        own: weight * square.max(0.0) + by_few * open,
+        usual: (1.0 - by_few) * open,
+    }
 }
 
 /// Errors of a frame (or cluster) come together: of few of them the 95th percentile is that of Student's distribution, over

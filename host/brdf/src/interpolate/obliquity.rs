@@ -6,8 +6,7 @@
 
 use super::cross_validation::MeanPrediction;
 use super::error_factor::{
-    BinNoise, PERCENTILE_SPREAD, TESTS_OF_CLASS, USUAL_FACTOR, Z95, factor_of, groups_of,
-    of_few_groups,
+    BinNoise, PERCENTILE_SPREAD, TESTS_OF_CLASS, Z95, factor_of, groups_of, of_few_groups,
 };
 use crate::direction::Vec3;
 use crate::elementary::Elementary;
@@ -67,8 +66,7 @@ impl Obliquity {
                 n = rest.len();
             }
             let (zone, others) = rest.split_at(n);
-            let usual = USUAL_FACTOR * USUAL_FACTOR;
-            let factor = factor_of(zone, noise, usual) * of_few_groups(zone);
+            let factor = factor_of(zone, noise).factor(1.0) * of_few_groups(zone);
             let weights = zone.iter().map(|of| of.first.weight);
             let sum: f32 = weights.clone().sum();
             let logs = zone.iter().zip(weights).map(|(of, w)| w * log(of));
@@ -102,18 +100,6 @@ impl Obliquity {
             level,
             least,
         }
-    }
-
-    /// The mean square of the factor over tests, each by how many left-out bins it stands for.
-    pub fn mean_square<const N: usize>(&self, means: &[&MeanPrediction<N>]) -> f32 {
-        let (mut sum, mut all) = (0.0, 0.0);
-        for of in means {
-            let bin = of.first.bin;
-            let factor = self.factor(bin.light.map(f64::from), bin.view.map(f64::from));
-            sum += of.first.weight * factor * factor;
-            all += of.first.weight;
-        }
-        if all > 0.0 { sum / all } else { 1.0 }
     }
 
     /// The factor at a pair of directions.
