@@ -337,6 +337,21 @@ fn of_a_retro_reflector_the_kernel_looks_at_the_difference() {
     assert!(best < 0.75 * alike, "{best} {alike}");
 }
 
+/// It would be nearer at frames left out by four in a hundred, and twice as far off between them.
+#[test]
+fn of_a_matte_material_it_looks_at_half_vector_and_difference() {
+    let matte = Kurt::white_reference_fabric();
+    let bins = Bins::new(
+        Grid::with_step_deg(4.0).unwrap(),
+        &measure_every(10, &matte),
+    );
+    let data = Data::new(&bins);
+    let settings = select(&data, FillSettings::DEFAULT).settings;
+    assert!(settings.kernel_weight <= 1.0, "{settings:?}");
+    let error = interior_error(&fill(&data, &settings, &silent).unwrap(), &matte);
+    assert!(error < 0.01, "{error}");
+}
+
 #[test]
 fn on_few_poses_presets_choose_alike_and_the_slower_is_the_nearer() {
     let grid = Grid::with_step_deg(4.0).unwrap();
