@@ -160,6 +160,8 @@ def test_ctrl_c_ends_it_and_other_threads_go_on():
 
     thread = threading.Thread(target=count)
     thread.start()
+    # A shell starts what runs in the background with Ctrl-C ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     signal.setitimer(signal.ITIMER_REAL, 0.7)
     began = time.monotonic()
