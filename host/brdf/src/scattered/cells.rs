@@ -348,7 +348,7 @@ impl<const N: usize> Filler<'_, N> {
         longest.unwrap_or(0)
     }
 
-    /// Fills cells, none of which is farther from their middle than they reach, and those beyond the plane of symmetry, by
+    /// Fills cells, all within their reach of their middle, and those beyond the plane of symmetry, by
     /// systems that they share.
     fn share(
         &self,
