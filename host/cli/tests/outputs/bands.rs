@@ -1,6 +1,6 @@
 //! One table of bands through every command.
 
-use crate::bench::{Bench, samples};
+use crate::bench::{Bench, fill_with_errors, samples};
 use crate::common::{gonia, gonia_ok, text};
 use gonia_brdf::Elementary;
 use gonia_formats::dense::read_dense_channels;
@@ -37,14 +37,7 @@ fn bands_are_filled_asked_compared_and_drawn_as_what_they_are() {
     fs::write(bench.at("s.csv"), table_of(&names.join(","), &of)).unwrap();
     let (samples, dense, error) = (bench.at("s.csv"), bench.at("d.exr"), bench.at("e.exr"));
     let step = ["--step", "15"];
-    let fill = [
-        "fill",
-        text(&samples),
-        "-o",
-        text(&dense),
-        "--error",
-        text(&error),
-    ];
+    let fill = fill_with_errors(&samples, &dense, &error);
     let said = gonia_ok(&[&fill[..], &step].concat(), "");
     assert!(said.contains("31 bands from 400nm to 1000nm"), "{said}");
     let asked = "theta_i,phi_i,theta_v,phi_v\n30,60,45,200\n";

@@ -6,7 +6,7 @@ use gonia_brdf::model::{Brdf, Kurt};
 use gonia_brdf::{DenseBrdf, Direction, Grid, Sample};
 use gonia_formats::samples::SampleNote;
 use gonia_rig::{DenseFile, Scale};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A folder, and the rows of the page that its cases make.
 pub struct Bench {
@@ -83,6 +83,12 @@ pub fn samples() -> Vec<Sample> {
             Sample::new(light, view, f.map(|v| v as f32))
         })
         .collect()
+}
+
+/// The words of a fill with error bars.
+pub fn fill_with_errors<'a>(samples: &'a Path, dense: &'a Path, errors: &'a Path) -> [&'a str; 6] {
+    let [samples, dense, errors] = [samples, dense, errors].map(|path| text(path));
+    ["fill", samples, "-o", dense, "--error", errors]
 }
 
 pub fn note(scale: Scale) -> SampleNote {

@@ -13,7 +13,7 @@ mod exports;
 mod paths;
 mod values;
 
-use crate::bench::{Bench, dense_of, samples};
+use crate::bench::{Bench, dense_of, fill_with_errors, samples};
 use crate::cases::document;
 use crate::common::{gonia, gonia_ok, text};
 use crate::exports::imports;
@@ -53,14 +53,7 @@ fn error_bars_belong_to_the_brdf_that_was_written_with_them() {
     });
     write_samples(&bench.at("s.npy"), &frames.collect::<Vec<_>>()).unwrap();
     let [samples, dense, errors] = ["s.npy", "dense.exr", "error.exr"].map(|n| bench.at(n));
-    let fill = [
-        "fill",
-        text(&samples),
-        "-o",
-        text(&dense),
-        "--error",
-        text(&errors),
-    ];
+    let fill = fill_with_errors(&samples, &dense, &errors);
     gonia_ok(
         &[&fill[..], &["--step", "15", "--preset", "preview"]].concat(),
         "",
