@@ -87,7 +87,7 @@ pub fn samples() -> Vec<Sample> {
 
 /// The words of a fill with error bars.
 pub fn fill_with_errors<'a>(samples: &'a Path, dense: &'a Path, errors: &'a Path) -> [&'a str; 6] {
-    let [samples, dense, errors] = [samples, dense, errors].map(|path| text(path));
+    let [samples, dense, errors] = [samples, dense, errors].map(text);
     ["fill", samples, "-o", dense, "--error", errors]
 }
 
